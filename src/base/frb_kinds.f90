@@ -1,0 +1,19 @@
+!> The one real kind of the library, and the constants that belong to it.
+module frb_kinds
+    use, intrinsic :: iso_fortran_env, only: real64
+    implicit none
+    private
+
+    public :: wp, pi, half_pi, two_pi, unit_roundoff
+
+    !> Working precision: IEEE double.
+    integer, parameter :: wp = real64
+
+    real(wp), parameter :: pi = 3.14159265358979323846264338327950288_wp
+    real(wp), parameter :: half_pi = 1.57079632679489661923132169163975144_wp
+    real(wp), parameter :: two_pi = 6.28318530717958647692528676655900577_wp
+
+    !> Largest relative error of one rounding, 2^-53.
+    real(wp), parameter :: unit_roundoff = epsilon(1.0_wp)/2
+
+end module frb_kinds

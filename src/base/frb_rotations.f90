@@ -1,0 +1,116 @@
+!> Vectors, quaternions and rotation matrices: the algebra of section 1.4, all pure.
+!>
+!> Conventions of the whole library, stated once here. Quaternions are real(4), scalar first, with the
+!> Hamilton product. An attitude, as a quaternion q or a matrix Q, takes body to space: v_space = Q v_body.
+!> Angular momentum m and angular velocity omega = m/I are in the body frame: q' = q (0, omega)/2,
+!> Q' = Q hat(omega), and Q m is constant.
+module frb_rotations
+    use frb_kinds, only: wp
+    implicit none
+    private
+
+    public :: cross, norm3, quat_product, quat_conjugate, quat_rotate, quat_to_matrix, matrix_to_quat
+
+contains
+
+    !> Vector product u x v.
+    pure function cross(u, v) result(w)
+        real(wp), intent(in) :: u(3), v(3)
+        real(wp) :: w(3)
+
+        w = [u(2)*v(3) - u(3)*v(2), u(3)*v(1) - u(1)*v(3), u(1)*v(2) - u(2)*v(1)]
+    end function cross
+
+    !> Euclidean norm without overflow or underflow, for any finite v.
+    pure function norm3(v) result(norm)
+        real(wp), intent(in) :: v(3)
+        real(wp) :: norm
+        real(wp) :: largest
+
+        largest = maxval(abs(v))
+        if (largest > 1.0e-140_wp .and. largest < 1.0e140_wp) then
+            norm = sqrt(v(1)*v(1) + v(2)*v(2) + v(3)*v(3))
+        else if (largest > 0.0_wp) then
+            norm = largest*sqrt(sum((v/largest)**2))
+        else
+            norm = largest
+        end if
+    end function norm3
+
+    !> Hamilton product p q.
+    pure function quat_product(p, q) result(pq)
+        real(wp), intent(in) :: p(4), q(4)
+        real(wp) :: pq(4)
+
+        pq(1) = p(1)*q(1) - p(2)*q(2) - p(3)*q(3) - p(4)*q(4)
+        pq(2) = p(1)*q(2) + q(1)*p(2) + p(3)*q(4) - p(4)*q(3)
+        pq(3) = p(1)*q(3) + q(1)*p(3) + p(4)*q(2) - p(2)*q(4)
+        pq(4) = p(1)*q(4) + q(1)*p(4) + p(2)*q(3) - p(3)*q(2)
+    end function quat_product
+
+    !> Conjugate of q; for a unit quaternion its inverse.
+    pure function quat_conjugate(q) result(conjugate)
+        real(wp), intent(in) :: q(4)
+        real(wp) :: conjugate(4)
+
+        conjugate = [q(1), -q(2), -q(3), -q(4)]
+    end function quat_conjugate
+
+    !> The vector E(q) v, from body to space for an attitude q of norm one, (10).
+    pure function quat_rotate(q, v) result(w)
+        real(wp), intent(in) :: q(4), v(3)
+        real(wp) :: w(3)
+        real(wp) :: twice_cross(3)
+
+        twice_cross = 2*cross(q(2:4), v)
+        w = v + q(1)*twice_cross + cross(q(2:4), twice_cross)
+    end function quat_rotate
+
+    !> Rotation matrix E(q) of a quaternion of norm one, (10).
+    pure function quat_to_matrix(q) result(matrix)
+        real(wp), intent(in) :: q(4)
+        real(wp) :: matrix(3, 3)
+
+        matrix(1, 1) = 1 - 2*(q(3)*q(3) + q(4)*q(4))
+        matrix(2, 1) = 2*(q(2)*q(3) + q(1)*q(4))
+        matrix(3, 1) = 2*(q(2)*q(4) - q(1)*q(3))
+        matrix(1, 2) = 2*(q(2)*q(3) - q(1)*q(4))
+        matrix(2, 2) = 1 - 2*(q(2)*q(2) + q(4)*q(4))
+        matrix(3, 2) = 2*(q(3)*q(4) + q(1)*q(2))
+        matrix(1, 3) = 2*(q(2)*q(4) + q(1)*q(3))
+        matrix(2, 3) = 2*(q(3)*q(4) - q(1)*q(2))
+        matrix(3, 3) = 1 - 2*(q(2)*q(2) + q(3)*q(3))
+    end function quat_to_matrix
+
+    !> Unit quaternion of a rotation matrix, up to sign; the scalar part comes back non-negative.
+    !> The largest component is formed first, so no digits are lost at any attitude.
+    pure function matrix_to_quat(matrix) result(q)
+        real(wp), intent(in) :: matrix(3, 3)
+        real(wp) :: q(4)
+        real(wp) :: squares(4)
+        integer :: largest
+
+        squares = 1 + [matrix(1, 1) + matrix(2, 2) + matrix(3, 3), &
+                       matrix(1, 1) - matrix(2, 2) - matrix(3, 3), &
+                       matrix(2, 2) - matrix(3, 3) - matrix(1, 1), &
+                       matrix(3, 3) - matrix(1, 1) - matrix(2, 2)]
+        largest = maxloc(squares, dim=1)
+        select case (largest)
+        case (1)
+            q = [squares(1), matrix(3, 2) - matrix(2, 3), matrix(1, 3) - matrix(3, 1), &
+                 matrix(2, 1) - matrix(1, 2)]
+        case (2)
+            q = [matrix(3, 2) - matrix(2, 3), squares(2), matrix(1, 2) + matrix(2, 1), &
+                 matrix(1, 3) + matrix(3, 1)]
+        case (3)
+            q = [matrix(1, 3) - matrix(3, 1), matrix(1, 2) + matrix(2, 1), squares(3), &
+                 matrix(2, 3) + matrix(3, 2)]
+        case default
+            q = [matrix(2, 1) - matrix(1, 2), matrix(1, 3) + matrix(3, 1), matrix(2, 3) + matrix(3, 2), &
+                 squares(4)]
+        end select
+        q = q/sqrt(sum(q**2))
+        if (q(1) < 0.0_wp) q = -q
+    end function matrix_to_quat
+
+end module frb_rotations

@@ -1,0 +1,81 @@
+!> Errors as values: named status codes, and the one routine that hands a code to the caller or stops.
+!>
+!> Every public procedure that can refuse its input has a last, optional argument `stat`. Present, it
+!> receives one of the codes below and nothing is printed; absent, a code other than `status_ok` prints one
+!> line to standard error and stops with exit code 1. Refused input leaves in-place arguments untouched and
+!> copies input to output elsewhere, so nothing is ever left unset.
+module frb_status
+    use, intrinsic :: iso_fortran_env, only: error_unit
+    implicit none
+    private
+
+    public :: conclude, status_message
+    public :: status_ok, status_bad_moments, status_bad_tensor, status_bad_momentum, status_bad_attitude
+    public :: status_bad_time, status_bad_count, status_bad_option, status_bad_torque, status_bad_scheme
+    public :: status_no_period, status_lapack_failed
+
+    integer, parameter :: status_ok = 0             !! done
+    integer, parameter :: status_bad_moments = 1    !! a moment of inertia is not positive and finite
+    integer, parameter :: status_bad_tensor = 2     !! inertia tensor not finite, symmetric, positive definite
+    integer, parameter :: status_bad_momentum = 3   !! angular momentum is not finite
+    integer, parameter :: status_bad_attitude = 4   !! attitude is not finite, or a quaternion of norm zero
+    integer, parameter :: status_bad_time = 5       !! time or step is not finite, or zero where it may not be
+    integer, parameter :: status_bad_count = 6      !! a number of bodies, points, steps or array sizes is wrong
+    integer, parameter :: status_bad_option = 7     !! an option has none of its values
+    integer, parameter :: status_bad_torque = 8     !! a torque or potential returned NaN or Inf
+    integer, parameter :: status_bad_scheme = 9     !! coefficients do not sum to one, or are not symmetric
+    integer, parameter :: status_no_period = 10     !! the motion has no period (a separatrix)
+    integer, parameter :: status_lapack_failed = 11 !! an eigensolver of LAPACK did not converge
+
+contains
+
+    !> Hands `code` to the caller when `stat` is present; otherwise stops if it says that something is wrong.
+    subroutine conclude(code, place, stat)
+        integer, intent(in) :: code             !! one of the codes of this module
+        character(*), intent(in) :: place       !! name of the routine that concludes
+        integer, intent(out), optional :: stat  !! receives `code`
+
+        if (present(stat)) then
+            stat = code
+        else if (code /= status_ok) then
+            write (error_unit, '(a)') place//': '//status_message(code)
+            error stop 1
+        end if
+    end subroutine conclude
+
+    !> One line that says what a status code means.
+    pure function status_message(code) result(message)
+        integer, intent(in) :: code
+        character(:), allocatable :: message
+
+        select case (code)
+        case (status_ok)
+            message = 'no error'
+        case (status_bad_moments)
+            message = 'moments of inertia must be positive and finite'
+        case (status_bad_tensor)
+            message = 'the inertia tensor must be finite, symmetric and positive definite'
+        case (status_bad_momentum)
+            message = 'the angular momentum must be finite'
+        case (status_bad_attitude)
+            message = 'the attitude must be finite, a quaternion of nonzero norm'
+        case (status_bad_time)
+            message = 'the time or step must be finite, and not zero where a step is divided by'
+        case (status_bad_count)
+            message = 'a count or an array size is out of range or does not match the others'
+        case (status_bad_option)
+            message = 'an option has none of its permitted values'
+        case (status_bad_torque)
+            message = 'the torque or the potential is not finite'
+        case (status_bad_scheme)
+            message = 'the coefficients of the scheme must be finite, symmetric and sum to one'
+        case (status_no_period)
+            message = 'the motion has no period'
+        case (status_lapack_failed)
+            message = 'the eigensolver of LAPACK did not converge'
+        case default
+            message = 'unknown status code'
+        end select
+    end function status_message
+
+end module frb_status

@@ -1,0 +1,19 @@
+!> The public interface of the library: the exact motion of a free rigid body.
+module frb
+    use frb_kinds, only: wp
+    use frb_status, only: status_message, status_ok, status_bad_moments, status_bad_tensor, &
+        status_bad_momentum, status_bad_attitude, status_bad_time, status_bad_count, status_bad_option, &
+        status_bad_torque, status_bad_scheme, status_no_period, status_lapack_failed
+    use frb_rotations, only: quat_product, quat_conjugate, quat_rotate, quat_to_matrix, matrix_to_quat
+    use frb_inertia, only: rigid_body, principal_axes
+    implicit none
+    private
+
+    public :: wp
+    public :: status_message, status_ok, status_bad_moments, status_bad_tensor
+    public :: status_bad_momentum, status_bad_attitude, status_bad_time, status_bad_count, status_bad_option
+    public :: status_bad_torque, status_bad_scheme, status_no_period, status_lapack_failed
+    public :: quat_product, quat_conjugate, quat_rotate, quat_to_matrix, matrix_to_quat
+    public :: rigid_body, principal_axes
+
+end module frb

@@ -1,0 +1,21 @@
+!> The one test program: every suite, then the closing line `N passed, N failed`.
+!> Exit code 1 when a check failed; `--fail` adds a check that must fail, to test the tests.
+program check
+    use, intrinsic :: iso_fortran_env, only: output_unit
+    use frb_checks, only: tally
+    use frb_test_base, only: test_base
+    implicit none
+    type(tally) :: t
+    character(16) :: argument
+
+    call test_base(t)
+
+    call get_command_argument(1, argument)
+    if (argument == '--fail') then
+        call t%open_suite('self-test', 1)
+        call t%ok('this-check-fails-on-purpose', .false.)
+        call t%close_suite()
+    end if
+    write (output_unit, '(i0,a,i0,a)') t%passed, ' passed, ', t%failed, ' failed'
+    if (t%failed > 0) error stop 1
+end program check

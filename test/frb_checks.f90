@@ -1,0 +1,120 @@
+!> A small check module: named checks, counted, each failure printed with got, expected, error, tolerance.
+!>
+!> A suite opens with the number of checks it is going to make; a different count at its end is a failure,
+!> so a test that silently does not run makes the suite red.
+module frb_checks
+    use, intrinsic :: iso_fortran_env, only: output_unit
+    use frb_kinds, only: wp
+    implicit none
+    private
+
+    public :: tally
+
+    type :: tally
+        integer :: passed = 0
+        integer :: failed = 0
+        integer, private :: announced = 0
+        integer, private :: at_opening = 0
+        character(:), allocatable, private :: suite
+    contains
+        procedure :: open_suite
+        procedure :: close_suite
+        procedure :: ok
+        procedure, private :: close_scalar
+        procedure, private :: close_vector
+        generic :: close_to => close_scalar, close_vector
+        procedure :: at_most
+        procedure :: equal
+    end type tally
+
+contains
+
+    !> Starts a suite that is to make `checks` checks.
+    subroutine open_suite(self, name, checks)
+        class(tally), intent(inout) :: self
+        character(*), intent(in) :: name
+        integer, intent(in) :: checks
+
+        self%suite = name
+        self%announced = checks
+        self%at_opening = self%passed + self%failed
+        write (output_unit, '(a,i0,a)') 'suite '//name//' (', checks, ')'
+    end subroutine open_suite
+
+    !> Ends a suite; fails if it made another number of checks than announced.
+    subroutine close_suite(self)
+        class(tally), intent(inout) :: self
+        integer :: made
+
+        made = self%passed + self%failed - self%at_opening
+        if (made /= self%announced) then
+            self%failed = self%failed + 1
+            write (output_unit, '(a,i0,a,i0)') '  FAILED '//self%suite//': made ', made, ' checks, announced ', &
+                self%announced
+        end if
+        flush (output_unit)
+    end subroutine close_suite
+
+    !> The statement `name` holds when `condition` does.
+    subroutine ok(self, name, condition)
+        class(tally), intent(inout) :: self
+        character(*), intent(in) :: name
+        logical, intent(in) :: condition
+
+        if (condition) then
+            self%passed = self%passed + 1
+        else
+            self%failed = self%failed + 1
+            write (output_unit, '(a)') '  FAILED '//self%suite//': '//name
+        end if
+    end subroutine ok
+
+    !> |got - expected| <= tolerance; NaN fails.
+    subroutine close_scalar(self, name, got, expected, tolerance)
+        class(tally), intent(inout) :: self
+        character(*), intent(in) :: name
+        real(wp), intent(in) :: got, expected, tolerance
+
+        call self%close_vector(name, [got], [expected], tolerance)
+    end subroutine close_scalar
+
+    !> max |got - expected| <= tolerance; NaN and different sizes fail.
+    subroutine close_vector(self, name, got, expected, tolerance)
+        class(tally), intent(inout) :: self
+        character(*), intent(in) :: name
+        real(wp), intent(in) :: got(:), expected(:), tolerance
+        logical :: good
+        integer :: i
+
+        good = size(got) == size(expected)
+        if (good) good = all(abs(got - expected) <= tolerance)
+        call self%ok(name, good)
+        if (.not. good) then
+            do i = 1, min(size(got), size(expected))
+                write (output_unit, '(4(a,es24.16))') '    got', got(i), ' expected', expected(i), &
+                    ' error', got(i) - expected(i), ' tolerance', tolerance
+            end do
+        end if
+    end subroutine close_vector
+
+    !> got <= bound; NaN fails.
+    subroutine at_most(self, name, got, bound)
+        class(tally), intent(inout) :: self
+        character(*), intent(in) :: name
+        real(wp), intent(in) :: got, bound
+
+        call self%ok(name, got <= bound)
+        if (.not. got <= bound) write (output_unit, '(2(a,es12.4))') '    got', got, ' bound', bound
+    end subroutine at_most
+
+    !> got == expected, for integers (counts, status codes).
+    subroutine equal(self, name, got, expected)
+        class(tally), intent(inout) :: self
+        character(*), intent(in) :: name
+        integer, intent(in) :: got, expected
+
+        call self%ok(name, got == expected)
+        if (got /= expected) write (output_unit, '(a,i0,a,i0)') '    got ', got, ' expected ', expected
+    end subroutine equal
+
+end module frb_checks
