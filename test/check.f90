@@ -4,11 +4,13 @@ program check
     use, intrinsic :: iso_fortran_env, only: output_unit
     use frb_checks, only: tally
     use frb_test_base, only: test_base
+    use frb_test_rivals, only: test_rivals
     implicit none
     type(tally) :: t
     character(16) :: argument
 
     call test_base(t)
+    call test_rivals(t)
 
     call get_command_argument(1, argument)
     if (argument == '--fail') then

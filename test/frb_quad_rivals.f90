@@ -1,0 +1,44 @@
+!> The rivals of the charts in quadruple precision: the very texts that the chart program times.
+module frb_quad_dmv
+    use, intrinsic :: iso_fortran_env, only: rk => real128
+    implicit none
+    private
+
+    public :: rk, dmv_body, new_dmv_body, dmv_steps
+
+    include '../app/charts/rivals/dmv.inc'
+
+end module frb_quad_dmv
+
+module frb_quad_rotations
+    use, intrinsic :: iso_fortran_env, only: rk => real128
+    implicit none
+    private
+
+    public :: rotation_steps
+
+    include '../app/charts/rivals/rotations.inc'
+
+end module frb_quad_rotations
+
+module frb_quad_runge_kutta
+    use, intrinsic :: iso_fortran_env, only: rk => real128
+    implicit none
+    private
+
+    public :: rk4_steps, dormand_prince
+
+    include '../app/charts/rivals/runge_kutta.inc'
+
+end module frb_quad_runge_kutta
+
+module frb_quad_truth
+    use, intrinsic :: iso_fortran_env, only: qp => real128
+    implicit none
+    private
+
+    public :: taylor_flow, taylor_period, long_truth
+
+    include '../app/charts/rivals/taylor.inc'
+
+end module frb_quad_truth
