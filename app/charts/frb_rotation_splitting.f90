@@ -1,0 +1,11 @@
+!> A rival: the splitting into three rotations, orders 2 and 4.
+module frb_rotation_splitting
+    use frb_kinds, only: rk => wp
+    implicit none
+    private
+
+    public :: rotation_steps
+
+    include 'rivals/rotations.inc'
+
+end module frb_rotation_splitting

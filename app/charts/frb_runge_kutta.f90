@@ -1,0 +1,11 @@
+!> Rivals: the classical Runge-Kutta method, and the adaptive 8(5,3) of Dormand and Prince.
+module frb_runge_kutta
+    use frb_kinds, only: rk => wp
+    implicit none
+    private
+
+    public :: rk4_steps, dormand_prince
+
+    include 'rivals/runge_kutta.inc'
+
+end module frb_runge_kutta

@@ -1,0 +1,12 @@
+!> The truth of every chart: a Taylor-series integration in quadruple precision, independent of every formula
+!> of the library.
+module frb_taylor_truth
+    use, intrinsic :: iso_fortran_env, only: qp => real128
+    implicit none
+    private
+
+    public :: qp, taylor_flow, taylor_period, long_truth
+
+    include 'rivals/taylor.inc'
+
+end module frb_taylor_truth
