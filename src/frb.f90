@@ -6,6 +6,7 @@ module frb
         status_bad_torque, status_bad_scheme, status_no_period, status_lapack_failed
     use frb_rotations, only: quat_product, quat_conjugate, quat_rotate, quat_to_matrix, matrix_to_quat
     use frb_inertia, only: rigid_body, principal_axes
+    use frb_free_flow, only: free_flow
     implicit none
     private
 
@@ -14,6 +15,6 @@ module frb
     public :: status_bad_momentum, status_bad_attitude, status_bad_time, status_bad_count, status_bad_option
     public :: status_bad_torque, status_bad_scheme, status_no_period, status_lapack_failed
     public :: quat_product, quat_conjugate, quat_rotate, quat_to_matrix, matrix_to_quat
-    public :: rigid_body, principal_axes
+    public :: rigid_body, principal_axes, free_flow
 
 end module frb
