@@ -5,12 +5,14 @@ program check
     use frb_checks, only: tally
     use frb_test_base, only: test_base
     use frb_test_rivals, only: test_rivals
+    use frb_test_files, only: test_files
     implicit none
     type(tally) :: t
     character(16) :: argument
 
     call test_base(t)
     call test_rivals(t)
+    call test_files(t)
 
     call get_command_argument(1, argument)
     if (argument == '--fail') then

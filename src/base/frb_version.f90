@@ -1,0 +1,10 @@
+!> The version of the package; a test holds it to the one in fpm.toml.
+module frb_version
+    implicit none
+    private
+
+    public :: version
+
+    character(*), parameter :: version = '0.1.0'
+
+end module frb_version
