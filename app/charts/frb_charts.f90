@@ -1,7 +1,97 @@
+!> Measures every method on the same work and draws speed against accuracy, and accuracy against closeness to
+!> the places where methods fail. Without arguments it lists the charts and draws none.
 program frb_charts
-    use frb_dmv, only: dmv_body
-    use frb_rotation_splitting, only: rotation_steps
-    use frb_runge_kutta, only: rk4_steps
-    use frb_taylor_truth, only: taylor_flow
+    use frb_chart_cost, only: chart_cost, chart_speed
+    use frb_chart_failure, only: chart_failure
+    use frb_chart_output, only: settings, say
+    use frb_chart_precision, only: chart_work_precision, chart_growth
+    use, intrinsic :: iso_fortran_env, only: error_unit
     implicit none
+    character(*), parameter :: names(*) = [character(16) :: 'speed', 'cost', 'work-precision', 'failure', 'growth']
+    type(settings) :: options
+    character(:), allocatable :: argument
+    logical :: wanted(size(names))
+    integer :: i, which, code
+
+    wanted = .false.
+    options%folder = 'charts'
+    i = 1
+    do while (i <= command_argument_count())
+        argument = argument_at(i)
+        select case (argument)
+        case ('--quick')
+            options%quick = .true.
+        case ('--out')
+            i = i + 1
+            options%folder = argument_at(i)
+            if (len(options%folder) == 0) call refuse('--out needs a folder')
+        case ('--help', '-h')
+            call list_charts()
+            stop
+        case ('all')
+            wanted = .true.
+        case default
+            which = findloc(names == argument, .true., dim=1)
+            if (which == 0) call refuse('no such chart: '//argument)
+            wanted(which) = .true.
+        end select
+        i = i + 1
+    end do
+    if (.not. any(wanted)) then
+        call list_charts()
+        stop
+    end if
+    if (index(options%folder, "'") > 0) call refuse('a quote in the name of the folder')
+    call execute_command_line('mkdir -p '''//options%folder//'''', exitstat=code)
+    if (code /= 0) call refuse('cannot make the folder '//options%folder)
+    call execute_command_line('test -t 2', exitstat=code)
+    options%terminal = code == 0
+    do i = 1, size(names)
+        if (.not. wanted(i)) cycle
+        call say(trim(names(i)))
+        select case (names(i))
+        case ('speed')
+            call chart_speed(options)
+        case ('cost')
+            call chart_cost(options)
+        case ('work-precision')
+            call chart_work_precision(options)
+        case ('failure')
+            call chart_failure(options)
+        case ('growth')
+            call chart_growth(options)
+        end select
+    end do
+
+contains
+
+    !> The argument at this place, '' past the end.
+    function argument_at(place) result(text)
+        integer, intent(in) :: place
+        character(:), allocatable :: text
+        integer :: length
+
+        call get_command_argument(place, length=length)
+        allocate (character(length) :: text)
+        if (length > 0) call get_command_argument(place, text)
+    end function argument_at
+
+    subroutine list_charts()
+        call say('usage: fpm run frb_charts --profile release -- [WHAT ...] [--quick] [--out DIR]')
+        call say('WHAT: all, or any of')
+        call say('  speed           table: the free flow against discrete Moser-Veselov, ratios of time')
+        call say('  cost            time per step against step size, all methods')
+        call say('  work-precision  error at t = 10 against time spent, three bodies')
+        call say('  failure         error against closeness to every place where methods fail')
+        call say('  growth          error against the number of steps for the same time')
+        call say('--quick: a minute for all of them; --out DIR: where the tables, scripts and pictures go (charts)')
+    end subroutine list_charts
+
+    subroutine refuse(message)
+        character(*), intent(in) :: message
+
+        write (error_unit, '(a)') 'frb_charts: '//message
+        error stop 1
+    end subroutine refuse
+
 end program frb_charts

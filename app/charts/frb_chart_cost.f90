@@ -1,0 +1,150 @@
+!> The charts of speed alone: `cost` (the paper's figure 6 made again) and `speed` (the table of ratios).
+module frb_chart_cost
+    use frb, only: wp
+    use frb_chart_methods, only: method, catalogue, find_method, style, family_dmv, family_batch
+    use frb_chart_output, only: settings, open_table, open_script, draw, say, quantile
+    use frb_chart_timing, only: workload, new_workload, time_in_turn
+    implicit none
+    private
+
+    public :: chart_cost, chart_speed
+
+    !> A body of order one that turns at 1 rad per unit of time, so that h is h omega.
+    real(wp), parameter :: moments(3) = [1.0_wp, 1.5_wp, 2.0_wp]
+    real(wp), parameter :: direction(3) = [0.5_wp, 0.6_wp, 0.7_wp]
+    real(wp), parameter :: start(3) = direction/sqrt(direction(1)**2/moments(1)**2 &
+        + direction(2)**2/moments(2)**2 + direction(3)**2/moments(3)**2)
+
+contains
+
+    !> Time per step against h, relative to the cheapest discrete Moser-Veselov method.
+    subroutine chart_cost(options)
+        type(settings), intent(in) :: options
+        type(method), allocatable :: methods(:)
+        type(workload), allocatable :: works(:)
+        real(wp), allocatable :: steps(:), ns(:, :), table(:, :, :)
+        integer :: i, k, unit, repetitions
+
+        allocate (methods, source=catalogue())
+        allocate (steps, source=[(10.0_wp**(merge(k/1.0_wp, k/3.0_wp, options%quick) - 3), &
+                                  k=0, merge(4, 12, options%quick))])
+        repetitions = merge(5, 15, options%quick)
+        allocate (works(size(methods)), ns(size(methods), repetitions), table(7, size(methods), size(steps)))
+        do k = 1, size(steps)
+            do i = 1, size(methods)
+                works(i) = new_workload(methods(i), moments, start, steps(k), &
+                                        merge(1000, 1, methods(i)%family == family_batch))
+            end do
+            call time_in_turn(options, 'cost', works, merge(1.0e-3_wp, 4.0e-3_wp, options%quick), .false., ns)
+            call summarise(methods, ns, table(:, :, k))
+            table(1, :, k) = steps(k)
+        end do
+
+        call open_table(options, 'cost', 'time per step against step size; a block per method', &
+                        'h*omega, ns per step: median, quartiles, relative to the cheapest dmv: median, quartiles', unit)
+        do i = 1, size(methods)
+            write (unit, '(a)') '# method: '//trim(methods(i)%key)
+            do k = 1, size(steps)
+                write (unit, '(es12.4,3f12.2,3f10.4)') table(:, i, k)
+            end do
+            write (unit, '(/)')
+        end do
+        close (unit)
+        call draw_cost(options, methods)
+    end subroutine chart_cost
+
+    !> Medians and quartiles of the times and of their ratio to the cheapest rival of the same repetition.
+    subroutine summarise(methods, ns, rows)
+        type(method), intent(in) :: methods(:)
+        real(wp), intent(in) :: ns(:, :)
+        real(wp), intent(out) :: rows(:, :)
+        real(wp) :: cheapest(size(ns, 2))
+        integer :: i
+
+        cheapest = minval(ns, dim=1, mask=spread(methods%family == family_dmv, 2, size(ns, 2)))
+        do i = 1, size(methods)
+            rows(2:4, i) = [quantile(ns(i, :), 0.5_wp), quantile(ns(i, :), 0.25_wp), quantile(ns(i, :), 0.75_wp)]
+            rows(5:7, i) = [quantile(ns(i, :)/cheapest, 0.5_wp), quantile(ns(i, :)/cheapest, 0.25_wp), &
+                            quantile(ns(i, :)/cheapest, 0.75_wp)]
+        end do
+    end subroutine summarise
+
+    subroutine draw_cost(options, methods)
+        type(settings), intent(in) :: options
+        type(method), intent(in) :: methods(:)
+        character(*), parameter :: shown(*) = [character(12) :: 'flow', 'flow-batch', 'flow-m', 'flow-a', &
+            'quat_step', 'frb_step', 'quat_step-2', 'frb_step-2', 'dmv2', 'dmv6', 'dmv10', 'rotations2', &
+            'rotations4', 'rk4', 'dp-6', 'dp-12']
+        integer :: unit, i, j
+        logical :: first
+
+        call open_script(options, 'cost', 900, 620, unit)
+        write (unit, '(a)') 'set logscale xy', 'set format x "10^{%T}"', &
+            'set xlabel "step size h {/Symbol w}  [rad]"', &
+            'set ylabel "time per step / cheapest discrete Moser-Veselov"', &
+            'set key outside right center vertical spacing 1.15', &
+            'set title "Cost of one step, quaternion attitude unless named"', &
+            'set arrow 1 from graph 0, first 1 to graph 1, first 1 nohead lc rgb "#666666" dt 3', &
+            'plot \'
+        first = .true.
+        do j = 1, size(shown)
+            do i = 1, size(methods)
+                if (methods(i)%key /= shown(j)) cycle
+                if (.not. first) write (unit, '(a)') ', \'
+                first = .false.
+                write (unit, '(a,i0,a)', advance='no') '  "cost.dat" index ', i - 1, ' using 1:5'//style(methods(i))
+            end do
+        end do
+        write (unit, '(a)') ''
+        close (unit)
+        call draw(options, 'cost')
+    end subroutine draw_cost
+
+    !> The table of ratios that the speed of the free flow is judged by.
+    subroutine chart_speed(options)
+        type(settings), intent(in) :: options
+        character(*), parameter :: names(*) = [character(12) :: 'dmv2', 'dmv4', 'dmv6', 'dmv8', 'dmv10', 'flow', &
+            'flow-m', 'flow-batch', 'flow-batch', 'flow-m', 'dmv2', 'dmv10', 'flow']
+        integer, parameter :: bodies(*) = [1, 1, 1, 1, 1, 1, 1, 1000, 1000000, 1000, 1000, 1000, 1000]
+        real(wp), parameter :: steps(*) = [0.001_wp, 0.003_wp, 0.01_wp, 0.03_wp, 0.1_wp, 0.3_wp, 1.0_wp, 3.0_wp, 10.0_wp]
+        type(workload), allocatable :: works(:)
+        real(wp), allocatable :: ns(:, :)
+        character(200) :: line
+        integer :: i, k, unit, repetitions, every
+
+        repetitions = merge(5, 9, options%quick)
+        every = merge(2, 1, options%quick)
+        allocate (ns(size(names), repetitions))
+        allocate (works(size(names)))
+        do i = 1, size(names)
+            works(i) = new_workload(find_method(trim(names(i))), moments, start, 1.0_wp, bodies(i))
+        end do
+        call open_table(options, 'speed', 'ratios of times per body and step: the median over the repetitions', &
+            'h*omega, dmv2 [ns], dmv10 [ns], free flow [ns], flow/dmv10, flow/dmv2, momentum only/dmv10, '// &
+            'batch of 1000/cheapest dmv, batch of 1e6/cheapest dmv, batch of 1000/dmv2 over 1000 bodies, '// &
+            'scalar flow over 1000 bodies/dmv10 over 1000 bodies', unit)
+        call say('h omega   dmv2  dmv10   flow  [ns] flow/dmv10 flow/dmv2 m/dmv10 b1000/dmv b1e6/dmv '// &
+                 'b1000/dmv2-1000 flow/dmv10-1000')
+        do k = 1, size(steps), every
+            works%h = steps(k)
+            works%nsteps = 1
+            call time_in_turn(options, 'speed', works, 2.0e-3_wp, .false., ns)
+            associate (dmv2 => ns(1, :), dmv10 => ns(5, :), flow => ns(6, :), cheapest => minval(ns(1:5, :), dim=1))
+                write (line, '(es9.1,3f7.1,7f10.3)') steps(k), middle(dmv2), middle(dmv10), middle(flow), &
+                    middle(flow/dmv10), middle(flow/dmv2), middle(ns(7, :)/dmv10), middle(ns(8, :)/cheapest), &
+                    middle(ns(9, :)/cheapest), middle(ns(8, :)/ns(11, :)), middle(ns(13, :)/ns(12, :))
+            end associate
+            write (unit, '(a)') trim(line)
+            call say(trim(line))
+        end do
+        close (unit)
+    end subroutine chart_speed
+
+    pure function middle(values) result(median)
+        real(wp), intent(in) :: values(:)
+        real(wp) :: median
+
+        median = quantile(values, 0.5_wp)
+    end function middle
+
+end module frb_chart_cost

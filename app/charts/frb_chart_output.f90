@@ -1,0 +1,202 @@
+!> What every chart shares: tables with a header that says where they come from, pictures through gnuplot,
+!> progress on a terminal, medians and reproducible random numbers.
+module frb_chart_output
+    use frb, only: wp
+    use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
+    use, intrinsic :: iso_fortran_env, only: compiler_options, compiler_version, error_unit, int64
+    implicit none
+    private
+
+    public :: settings, open_table, open_script, draw, progress, say, sorted, quantile, uniform, random_direction
+
+    !> What the command line asks for.
+    type :: settings
+        logical :: quick = .false.
+        logical :: terminal = .false.               !! standard error is a terminal: show progress
+        character(:), allocatable :: folder         !! where tables and pictures go
+    end type settings
+
+    !> Okabe and Ito's palette, which colour-blind readers can tell apart, and shared settings.
+    character(*), parameter :: palette(*) = [character(9) :: '"#000000"', '"#D55E00"', '"#0072B2"', &
+        '"#009E73"', '"#CC79A7"', '"#E69F00"', '"#56B4E9"', '"#999999"']
+
+contains
+
+    !> Opens the table FOLDER/NAME.dat and writes its header: title, machine, compiler, flags, columns.
+    subroutine open_table(options, name, title, columns, unit)
+        type(settings), intent(in) :: options
+        character(*), intent(in) :: name, title
+        character(*), intent(in) :: columns         !! names and units of the columns
+        integer, intent(out) :: unit
+
+        open (newunit=unit, file=options%folder//'/'//name//'.dat', status='replace', action='write')
+        write (unit, '(a)') '# '//title
+        write (unit, '(a)') '# made by: fpm run frb_charts'//trim(merge(' (--quick)', '          ', options%quick))
+        write (unit, '(a)') '# processor: '//processor()
+        write (unit, '(a)') '# compiler: '//compiler_version()
+        write (unit, '(a)') '# flags: '//flags()
+        write (unit, '(a)') '# columns: '//columns
+    end subroutine open_table
+
+    !> Opens the gnuplot script FOLDER/NAME.gp and writes what every script begins with: an SVG of the given
+    !> size (a PNG when called as `gnuplot -e "format='png'" NAME.gp`), one font, colours as line types.
+    subroutine open_script(options, name, width, height, unit)
+        type(settings), intent(in) :: options
+        character(*), intent(in) :: name
+        integer, intent(in) :: width, height        !! of the picture [pixels]
+        integer, intent(out) :: unit
+        integer :: i
+
+        open (newunit=unit, file=options%folder//'/'//name//'.gp', status='replace', action='write')
+        write (unit, '(a)') '# drawn by: gnuplot '//name//'.gp, in the folder of the tables'
+        write (unit, '(a,i0,a,i0,a)') 'if (!exists("format")) set terminal svg size ', width, ',', height, &
+            ' font "Helvetica,15" background "#ffffff"; set output "'//name//'.svg"'
+        write (unit, '(a,i0,a,i0,a)') 'if (exists("format")) set terminal pngcairo size ', width, ',', height, &
+            ' font "Helvetica,12"; set output "'//name//'.png"'
+        do i = 1, size(palette)
+            write (unit, '(a,i0,a)') 'set linetype ', i, ' lc rgb '//trim(palette(i))//' lw 2 pt 7 ps 0.5'
+        end do
+        write (unit, '(a)') 'set grid lc rgb "#dddddd" lw 1 lt 1'
+        write (unit, '(a)') 'set border lc rgb "#444444"'
+        write (unit, '(a)') 'set tics nomirror'
+    end subroutine open_script
+
+    !> Runs gnuplot on FOLDER/NAME.gp; without gnuplot the tables and the script stay.
+    subroutine draw(options, name)
+        type(settings), intent(in) :: options
+        character(*), intent(in) :: name
+        integer :: code, command_code
+
+        call execute_command_line('cd '''//options%folder//''' && gnuplot '//name//'.gp', exitstat=code, &
+                                  cmdstat=command_code)
+        if (command_code == 0 .and. code == 0) then
+            call say('  '//options%folder//'/'//name//'.svg')
+        else
+            call say('  no picture: gnuplot is missing or failed; the table and the script '//options%folder// &
+                     '/'//name//'.gp are kept, "gnuplot '//name//'.gp" in that folder draws it')
+        end if
+    end subroutine draw
+
+    !> One line on standard output.
+    subroutine say(line)
+        character(*), intent(in) :: line
+
+        write (*, '(a)') line
+        flush (6)
+    end subroutine say
+
+    !> How far a chart has come, on one line of the terminal.
+    subroutine progress(options, what, done, of)
+        type(settings), intent(in) :: options
+        character(*), intent(in) :: what
+        integer, intent(in) :: done, of
+
+        if (.not. options%terminal) return
+        write (error_unit, '(a,i4,a)', advance='no') achar(13)//what//':', (100*done)/max(of, 1), ' %   '
+        if (done >= of) write (error_unit, '(a)', advance='no') achar(13)//repeat(' ', len(what) + 12)//achar(13)
+        flush (error_unit)
+    end subroutine progress
+
+    !> The flags of this build that change speed or digits; paths and warnings are left out.
+    function flags() result(kept)
+        character(:), allocatable :: kept
+        character(:), allocatable :: rest, word
+        integer :: blank
+
+        kept = ''
+        rest = compiler_options()//' '
+        do while (len(rest) > 0)
+            blank = index(rest, ' ')
+            word = rest(:blank - 1)
+            rest = rest(blank + 1:)
+            if (len(word) < 2) cycle
+            if (index(word, '/') > 0) cycle
+            if (word(:2) == '-O' .or. word(:2) == '-f' .or. word(:6) == '-march') kept = kept//' '//word
+        end do
+        kept = adjustl(kept)
+        if (len(kept) == 0) kept = '(none)'
+    end function flags
+
+    !> The processor's name as the system gives it.
+    function processor() result(name)
+        character(:), allocatable :: name
+        character(200) :: line
+        integer :: unit, io
+
+        name = 'unknown'
+        open (newunit=unit, file='/proc/cpuinfo', status='old', action='read', iostat=io)
+        if (io /= 0) return
+        do
+            read (unit, '(a)', iostat=io) line
+            if (io /= 0) exit
+            if (line(:10) == 'model name') then
+                name = trim(adjustl(line(index(line, ':') + 1:)))
+                exit
+            end if
+        end do
+        close (unit)
+    end function processor
+
+    !> The values in ascending order; NaN last.
+    pure function sorted(values) result(ascending)
+        real(wp), intent(in) :: values(:)
+        real(wp) :: ascending(size(values))
+        real(wp) :: key
+        integer :: i, j
+
+        ascending = values
+        do i = 2, size(ascending)
+            key = ascending(i)
+            j = i - 1
+            do while (j >= 1)
+                if (ascending(j) <= key .or. ieee_is_nan(key)) exit
+                ascending(j + 1) = ascending(j)
+                j = j - 1
+            end do
+            ascending(j + 1) = key
+        end do
+    end function sorted
+
+    !> The value a fraction of the way through the sorted values; 0.5 gives the median.
+    pure function quantile(values, fraction) result(value)
+        real(wp), intent(in) :: values(:), fraction
+        real(wp) :: value
+        real(wp) :: ascending(size(values)), place
+        integer :: low
+
+        ascending = sorted(values)
+        place = 1 + fraction*(size(values) - 1)
+        low = min(int(place), size(values) - 1)
+        if (size(values) == 1) then
+            value = ascending(1)
+        else
+            value = ascending(low) + (place - low)*(ascending(low + 1) - ascending(low))
+        end if
+    end function quantile
+
+    !> Uniform random number in (0, 1), the same on every machine (Park and Miller's generator).
+    subroutine uniform(seed, x)
+        integer(int64), intent(inout) :: seed       !! state, 1 to 2147483646
+        real(wp), intent(out) :: x
+
+        seed = mod(48271_int64*seed, 2147483647_int64)
+        x = real(seed, wp)/2147483647.0_wp
+    end subroutine uniform
+
+    !> Random unit vector, uniform on the sphere.
+    subroutine random_direction(seed, v)
+        integer(int64), intent(inout) :: seed
+        real(wp), intent(out) :: v(3)
+        real(wp) :: x(3)
+
+        do
+            call uniform(seed, x(1))
+            call uniform(seed, x(2))
+            call uniform(seed, x(3))
+            v = 2*x - 1
+            if (sum(v**2) < 1.0_wp .and. sum(v**2) > 0.01_wp) exit
+        end do
+        v = v/norm2(v)
+    end subroutine random_direction
+
+end module frb_chart_output

@@ -1,0 +1,269 @@
+!> The charts of error against work: `work-precision` (error at t = 10 against the time spent) and `growth`
+!> (error against the number of steps the same time is cut into).
+module frb_chart_precision
+    use frb, only: wp
+    use frb_chart_methods, only: method, catalogue, style, family_flow, family_batch, family_momentum, &
+        family_matrix, family_dp
+    use frb_chart_output, only: settings, open_table, open_script, draw, progress, quantile, uniform, random_direction
+    use frb_chart_timing, only: workload, new_workload, time_in_turn
+    use frb_chart_truth, only: free_case, new_case, errors_of
+    use, intrinsic :: iso_fortran_env, only: int64
+    implicit none
+    private
+
+    public :: chart_work_precision, chart_growth
+
+    !> Errors are drawn from here up: a result that is right to the last bit has none.
+    real(wp), parameter :: floor_of_errors = 1.0e-17_wp
+
+    type :: point
+        real(wp) :: setting = 0.0_wp        !! number of steps, or the tolerance
+        real(wp) :: ns(3) = 0.0_wp          !! time to t = 10 [ns]: median, quartiles
+        real(wp) :: error_m = 0.0_wp
+        real(wp) :: error_q = 0.0_wp
+    end type point
+
+contains
+
+    !> Error of the attitude at t = 10 against the time spent on getting there, three bodies.
+    subroutine chart_work_precision(options)
+        type(settings), intent(in) :: options
+        real(wp), parameter :: bodies(3, 3) = reshape([0.92_wp, 0.96_wp, 1.0_wp, 0.345_wp, 0.653_wp, 1.0_wp, &
+                                                       0.05_wp, 0.97_wp, 1.0_wp], [3, 3])
+        character(*), parameter :: names(3) = [character(9) :: 'round', 'flat', 'elongated']
+        real(wp), parameter :: m0(3) = [1.8_wp, 0.4_wp, -0.9_wp]
+        type(method), allocatable :: methods(:)
+        type(point), allocatable :: points(:, :)
+        integer, allocatable :: counts(:)
+        integer :: b, unit
+
+        allocate (methods, source=curves())
+        allocate (points(16, size(methods)), counts(size(methods)))
+        do b = 1, 3
+            call measure(options, methods, new_case(bodies(:, b), m0, 10.0_wp), points, counts)
+            call open_table(options, 'work-precision-'//trim(names(b)), &
+                'errors at t = 10 against the time to get there, from m = (1.8, 0.4, -0.9); a block per method, '// &
+                'last the envelope', 'number of steps or tolerance; time [ns]: median, quartiles; '// &
+                'error of attitude [rad]; error of momentum', unit)
+            write (unit, '(a,3f8.4)') '# moments:', bodies(:, b)
+            call write_points(unit, methods, points, counts)
+            close (unit)
+        end do
+        call draw_work_precision(options, methods, names, bodies)
+    end subroutine chart_work_precision
+
+    !> The methods of these charts; the tolerances of the adaptive one make one curve.
+    function curves() result(chosen)
+        type(method), allocatable :: chosen(:)
+        type(method), allocatable :: methods(:)
+        logical, allocatable :: keep(:)
+        integer :: i
+
+        allocate (methods, source=catalogue())
+        allocate (keep(size(methods)))
+        do i = 1, size(methods)
+            keep(i) = methods(i)%family /= family_batch .and. methods(i)%family /= family_momentum &
+                .and. methods(i)%family /= family_matrix
+            if (methods(i)%family == family_dp) keep(i) = methods(i)%key == 'dp-12'
+        end do
+        allocate (chosen, source=pack(methods, keep))
+        do i = 1, size(chosen)
+            if (chosen(i)%family == family_dp) then
+                chosen(i)%key = 'dp'
+                chosen(i)%label = 'Dormand-Prince 8(5,3)'
+            end if
+        end do
+    end function curves
+
+    !> Times and errors of every method at every number of steps.
+    subroutine measure(options, methods, item, points, counts)
+        type(settings), intent(in) :: options
+        type(method), intent(in) :: methods(:)
+        type(free_case), intent(in) :: item
+        type(point), intent(out) :: points(:, :)
+        integer, intent(out) :: counts(:)
+        type(workload), allocatable :: works(:)
+        real(wp), allocatable :: ns(:, :)
+        type(method) :: with
+        integer :: i, k, n, total, steps
+
+        total = 0
+        allocate (works(size(points)))
+        do i = 1, size(methods)
+            with = methods(i)
+            counts(i) = 14
+            if (with%exact) counts(i) = 4
+            if (with%family == family_flow) counts(i) = 5
+            if (options%quick) counts(i) = (counts(i) + 1)/2
+            do k = 1, counts(i)
+                n = merge(2*k - 1, k, options%quick)
+                steps = 5*2**(n - 1)
+                if (with%exact) steps = 10**(n - 1)
+                if (with%exact .and. with%points > 0) steps = 4**(n - 1)
+                points(k, i)%setting = steps
+                if (with%family == family_dp) then
+                    steps = 1
+                    with%tolerance = 10.0_wp**(-2 - n)
+                    points(k, i)%setting = with%tolerance
+                end if
+                total = total + 1
+                works(total) = new_workload(with, item%moments, item%m0, item%t/steps, 1)
+                works(total)%nsteps = steps
+                call errors_of(with, item, steps, points(k, i)%error_m, points(k, i)%error_q)
+            end do
+        end do
+        allocate (ns(total, merge(5, 9, options%quick)))
+        call time_in_turn(options, 'work-precision', works(:total), merge(0.5e-3_wp, 2.0e-3_wp, options%quick), &
+                          .true., ns)
+        total = 0
+        do i = 1, size(methods)
+            do k = 1, counts(i)
+                total = total + 1
+                points(k, i)%ns = works(total)%nsteps*[quantile(ns(total, :), 0.5_wp), &
+                    quantile(ns(total, :), 0.25_wp), quantile(ns(total, :), 0.75_wp)]
+            end do
+        end do
+    end subroutine measure
+
+    !> The blocks of a table, and at its end the envelope: points that no other beats in both respects.
+    subroutine write_points(unit, methods, points, counts)
+        integer, intent(in) :: unit
+        type(method), intent(in) :: methods(:)
+        type(point), intent(in) :: points(:, :)
+        integer, intent(in) :: counts(:)
+        real(wp) :: best_error, time, last_time
+        integer :: i, k, place(2)
+
+        do i = 1, size(methods)
+            write (unit, '(a)') '# method: '//trim(methods(i)%key)
+            do k = 1, counts(i)
+                write (unit, '(es10.2,3es13.4,2es12.3)') points(k, i)%setting, points(k, i)%ns, &
+                    max(floor_of_errors, points(k, i)%error_q), max(floor_of_errors, points(k, i)%error_m)
+            end do
+            write (unit, '(/)')
+        end do
+        write (unit, '(a)') '# envelope: time [ns], error of attitude [rad], method'
+        best_error = 1.0e3_wp
+        last_time = 0.0_wp
+        do
+            time = huge(1.0_wp)
+            place = 0
+            do i = 1, size(methods)
+                do k = 1, counts(i)
+                    if (points(k, i)%ns(1) < time .and. max(floor_of_errors, points(k, i)%error_q) < best_error &
+                        .and. points(k, i)%ns(1) >= last_time) then
+                        time = points(k, i)%ns(1)
+                        place = [k, i]
+                    end if
+                end do
+            end do
+            if (place(1) == 0) exit
+            best_error = max(floor_of_errors, points(place(1), place(2))%error_q)
+            last_time = time
+            write (unit, '(2es13.4,1x,a)') time, best_error, trim(methods(place(2))%key)
+        end do
+    end subroutine write_points
+
+    subroutine draw_work_precision(options, methods, names, bodies)
+        type(settings), intent(in) :: options
+        type(method), intent(in) :: methods(:)
+        character(*), intent(in) :: names(:)
+        real(wp), intent(in) :: bodies(:, :)
+        character(60) :: title
+        integer :: unit, b, i
+
+        call open_script(options, 'work-precision', 1000, 940, unit)
+        write (unit, '(a)') 'set multiplot', 'set logscale xy', 'set format x "10^{%T}"', 'set format y "10^{%T}"', &
+            'set yrange [1e-17:10]', 'set xrange [30:5e6]', 'set ytics 1e-16,1e2', &
+            'set xlabel "time spent to reach t = 10  [ns]" offset 0,0.4', 'set ylabel "error of attitude  [rad]"', &
+            'unset key', 'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0'
+        do b = 1, size(names)
+            write (title, '(a,3f7.3,a)') ': I = (', bodies(:, b), ')'
+            write (unit, '(a)') 'set title "'//trim(names(b))//' body'//trim(title)//'" offset 0,-0.6'
+            write (unit, '(a,f5.3,a,f5.3)') 'set origin ', merge(0.08, 0.58, mod(b, 2) == 1), ',', &
+                merge(0.56, 0.07, b < 3)
+            write (unit, '(a)') 'set size 0.40,0.40', 'plot \'
+            write (unit, '(a,i0,a)') '  "work-precision-'//trim(names(b))//'.dat" index ', size(methods), &
+                ' using 1:2 with steps lc rgb "#dddddd" lw 12 notitle, \'
+            do i = size(methods), 1, -1
+                write (unit, '(a,i0,a)') '  "work-precision-'//trim(names(b))//'.dat" index ', i - 1, &
+                    ' using 2:5'//style(methods(i), '')//trim(merge('    ', ', \ ', i == 1))
+            end do
+        end do
+        write (unit, '(a)') 'set origin 0.53,0.05', 'set size 0.47,0.45', 'unset border', 'unset tics', 'unset xlabel', &
+            'unset ylabel', 'unset title', 'unset grid', 'unset logscale', 'set xrange [0:1]', 'set yrange [0:1]', &
+            'set key center center maxrows 12 samplen 2.2 spacing 1.1 width -2', 'plot NaN with lines lc rgb "#dddddd" lw 12 '// &
+            'title "lower left envelope", \'
+        do i = 1, size(methods)
+            write (unit, '(a)') '  NaN'//style(methods(i))//trim(merge('    ', ', \ ', i == size(methods)))
+        end do
+        write (unit, '(a)') 'unset multiplot'
+        close (unit)
+        call draw(options, 'work-precision')
+    end subroutine draw_work_precision
+
+    !> Error of the attitude after a fixed time against the number of steps: median over bodies.
+    subroutine chart_growth(options)
+        type(settings), intent(in) :: options
+        real(wp), parameter :: duration = 16.0_wp
+        type(method), allocatable :: methods(:)
+        type(free_case), allocatable :: cases(:)
+        real(wp), allocatable :: errors(:, :)
+        real(wp) :: moments(3), m0(3), x
+        integer(int64) :: seed
+        integer :: b, i, k, n, unit, most
+
+        allocate (methods, source=curves())
+        allocate (cases(merge(5, 9, options%quick)))
+        allocate (errors(2, size(cases)))
+        seed = 6021023_int64
+        do b = 1, size(cases)
+            moments(3) = 1.0_wp
+            call uniform(seed, x)
+            moments(2) = 0.5_wp + 0.45_wp*x
+            call uniform(seed, x)
+            moments(1) = (1 - moments(2)) + x*(2*moments(2) - 1)
+            call random_direction(seed, m0)
+            cases(b) = new_case(moments, m0*0.5_wp, duration)
+        end do
+        most = merge(6, 12, options%quick)
+        call open_table(options, 'growth', 'errors at t = 16 against the number of steps, |m| = 1/2, median and '// &
+            'largest over 9 bodies (5 with --quick); a block per method', 'steps, error of attitude [rad]: median, '// &
+            'largest; error of momentum: median, largest', unit)
+        do i = 1, size(methods)
+            if (methods(i)%family == family_dp) cycle
+            write (unit, '(a)') '# method: '//trim(methods(i)%key)
+            do k = 0, most
+                n = nint(10.0_wp**(0.5_wp*k))
+                do b = 1, size(cases)
+                    call errors_of(methods(i), cases(b), n, errors(1, b), errors(2, b))
+                end do
+                write (unit, '(i8,4es12.3)') n, max(floor_of_errors, quantile(errors(2, :), 0.5_wp)), &
+                    max(floor_of_errors, maxval(errors(2, :))), max(floor_of_errors, quantile(errors(1, :), 0.5_wp)), &
+                    max(floor_of_errors, maxval(errors(1, :)))
+                call progress(options, 'growth', (i - 1)*(most + 1) + k + 1, size(methods)*(most + 1))
+            end do
+            write (unit, '(/)')
+        end do
+        close (unit)
+        call progress(options, 'growth', 1, 1)
+        call open_script(options, 'growth', 900, 640, unit)
+        write (unit, '(a)') 'set logscale xy', 'set format x "10^{%T}"', 'set format y "10^{%T}"', &
+            'set xrange [0.8:1.2e6]', 'set yrange [1e-17:10]', 'set xlabel "number of steps to t = 16"', &
+            'set ylabel "error of attitude, median of 9 bodies  [rad]"', &
+            'set title "Cutting the same time into more steps"', &
+            'set key outside right center vertical spacing 1.1 samplen 2.2', 'plot \', &
+            '  1.1e-16*sqrt(x) with lines lc rgb "#777777" lw 1 dt 3 title "2^{-53} {/Symbol \326}N", \', &
+            '  1.1e-16*x with lines lc rgb "#777777" lw 1 dt 2 title "2^{-53} N", \'
+        k = 0
+        do i = 1, size(methods)
+            if (methods(i)%family == family_dp) cycle
+            write (unit, '(a,i0,a)') '  "growth.dat" index ', k, ' using 1:2'//style(methods(i))//', \'
+            k = k + 1
+        end do
+        write (unit, '(a)') '  NaN notitle'
+        close (unit)
+        call draw(options, 'growth')
+    end subroutine chart_growth
+
+end module frb_chart_precision
