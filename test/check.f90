@@ -6,6 +6,8 @@ program check
     use frb_test_base, only: test_base
     use frb_test_rivals, only: test_rivals
     use frb_test_files, only: test_files
+    use frb_test_carlson, only: test_carlson
+    use frb_test_agm, only: test_agm
     implicit none
     type(tally) :: t
     character(16) :: argument
@@ -13,6 +15,8 @@ program check
     call test_base(t)
     call test_rivals(t)
     call test_files(t)
+    call test_carlson(t)
+    call test_agm(t)
 
     call get_command_argument(1, argument)
     if (argument == '--fail') then
