@@ -4,7 +4,7 @@ module frb_elliptic_table
     implicit none
     private
 
-    public :: table_entry, read_table, rows_of
+    public :: table_entry, read_table, columns_of
 
     type :: table_entry
         character(4) :: name = ''           !! the function
@@ -46,13 +46,23 @@ contains
         close (unit)
     end subroutine read_table
 
-    !> The records of one function.
-    function rows_of(entries, name) result(rows)
+    !> The records of one function, as columns.
+    subroutine columns_of(entries, name, x, values)
         type(table_entry), intent(in) :: entries(:)
         character(*), intent(in) :: name
-        type(table_entry), allocatable :: rows(:)
+        real(wp), allocatable, intent(out) :: x(:, :)     !! inputs, one record a row
+        real(wp), allocatable, intent(out) :: values(:)
+        integer :: i, row
 
-        rows = pack(entries, entries%name == name)
-    end function rows_of
+        allocate (x(count(entries%name == name), 4), values(count(entries%name == name)))
+        row = 0
+        do i = 1, size(entries)
+            if (entries(i)%name == name) then
+                row = row + 1
+                x(row, :) = entries(i)%x
+                values(row) = entries(i)%value
+            end if
+        end do
+    end subroutine columns_of
 
 end module frb_elliptic_table

@@ -152,8 +152,9 @@ contains
     end subroutine jacobi
 
     !> The momentum step of section 3.2 (EgellipX_step): from (sn0, cn0) at u0 to sn, cn, dn at u0 + du, and
-    !> the amplitudes phi0 = am(u0) in [-pi, pi] and phi1 = am(u0 + du), continuous with phi0, so that phi1 - phi0
-    !> counts the turns. One sequence serves the transformation of phi0 and the one back from u0 + du.
+    !> the amplitudes phi0 = am(u0) in [-pi, pi] and phi1 = am(u0 + du), continuous with phi0, so that
+    !> phi1 - phi0 counts the turns. One sequence serves both transformations, from phi0 and
+    !> back from u0 + du.
     !> sn0**2 + cn0**2 need not be one to rounding: only the angle counts, and sn0 = cn0 = 0 stands for 0.
     !> At k = 1 the motion tends to sn = +-1; there cn keeps the sign of cn0, and cn0 = 0 stays at rest.
     !> Domain: |k| <= 1 (or 0 <= kc2 <= 1), all arguments finite, |sn0|, |cn0| <= 1e100; outside: NaN.
