@@ -1,0 +1,174 @@
+!> What a run ought to keep: energy, momentum in space, norms; and an observer that watches them.
+module frb_invariants
+    use frb_inertia, only: rigid_body
+    use frb_kinds, only: wp
+    use frb_rotations, only: quat_rotate
+    use frb_torque, only: body_scene, group_scene, body_observer
+    implicit none
+    private
+
+    public :: kinetic_energy, total_energy, spatial_momentum, norm_defect, invariant_monitor
+
+    !> T = sum of m_j^2/(2 I_j), of one body or of all: kinetic_energy(body, m). For n bodies m is (3, n),
+    !> body a scalar or body(n).
+    interface kinetic_energy
+        module procedure kinetic_energy_of_body
+        module procedure kinetic_energy_alike
+        module procedure kinetic_energy_of_group
+    end interface kinetic_energy
+
+    !> T + V: total_energy(body, scene, t, m, q), of one body or of all. NaN when the scene gives no
+    !> potential. Constant in time when the potential does not depend on time.
+    interface total_energy
+        module procedure total_energy_of_body
+        module procedure total_energy_alike
+        module procedure total_energy_of_group
+    end interface total_energy
+
+    !> Angular momentum in the space frame, Q m: spatial_momentum(m, q), of one body or summed over all.
+    !> Under a torque its component along an axis is constant when turning the body about that axis in space
+    !> leaves the potential as it is: along `force` for a heavy top.
+    interface spatial_momentum
+        module procedure spatial_momentum_of_body
+        module procedure spatial_momentum_of_group
+    end interface spatial_momentum
+
+    !> An observer that keeps the largest departures from the values at the start of the run.
+    !> `axis` is the direction in space along which the momentum is conserved, if any.
+    type, extends(body_observer) :: invariant_monitor
+        type(rigid_body) :: body
+        class(body_scene), allocatable :: scene
+        real(wp) :: axis(3) = [0.0_wp, 0.0_wp, 1.0_wp]  !! direction in space, unit vector
+        real(wp) :: energy = 0.0_wp                     !! total energy at the start
+        real(wp) :: momentum = 0.0_wp                   !! axis . Q m at the start
+        real(wp) :: energy_error = 0.0_wp               !! largest |T + V - energy|
+        real(wp) :: momentum_error = 0.0_wp             !! largest |axis . Q m - momentum|
+        real(wp) :: norm_error = 0.0_wp                 !! largest | |q| - 1 |
+    contains
+        procedure :: observe => monitor_body
+    end type invariant_monitor
+
+contains
+
+    !> |q| - 1, without the loss of digits of a square root near one.
+    pure function norm_defect(q) result(defect)
+        real(wp), intent(in) :: q(4)
+        real(wp) :: defect
+        real(wp) :: square_defect
+
+        square_defect = (q(1) - 1)*(q(1) + 1) + q(2)*q(2) + q(3)*q(3) + q(4)*q(4)
+        defect = square_defect/(1 + sqrt(max(1 + square_defect, 0.0_wp)))
+    end function norm_defect
+
+    !> T of one body; 0 for a body that could not be made.
+    pure function kinetic_energy_of_body(body, m) result(energy)
+        type(rigid_body), intent(in) :: body
+        real(wp), intent(in) :: m(3)    !! angular momentum, body frame
+        real(wp) :: energy
+        real(wp) :: along(3)
+
+        along = m(body%order)
+        if (body%turned) then
+            along = matmul(m, body%axes)
+            along = along(body%order)
+        end if
+        energy = 0.5_wp*sum(body%a*along**2)
+    end function kinetic_energy_of_body
+
+    !> T of n bodies that are alike.
+    pure function kinetic_energy_alike(body, m) result(energy)
+        type(rigid_body), intent(in) :: body
+        real(wp), intent(in) :: m(:, :)     !! angular momenta (3, n), body frames
+        real(wp) :: energy
+
+        energy = kinetic_energy_of_group([body], m)
+    end function kinetic_energy_alike
+
+    !> T of n bodies.
+    pure function kinetic_energy_of_group(body, m) result(energy)
+        type(rigid_body), intent(in) :: body(:)     !! n bodies, or one for all
+        real(wp), intent(in) :: m(:, :)             !! angular momenta (3, n), body frames
+        real(wp) :: energy
+        integer :: i
+
+        energy = 0.0_wp
+        do i = 1, size(m, 2)
+            energy = energy + kinetic_energy_of_body(body(min(i, size(body))), m(:, i))
+        end do
+    end function kinetic_energy_of_group
+
+    !> T + V of one body.
+    pure function total_energy_of_body(body, scene, t, m, q) result(energy)
+        type(rigid_body), intent(in) :: body
+        class(body_scene), intent(in) :: scene
+        real(wp), intent(in) :: t, m(3), q(4)
+        real(wp) :: energy
+
+        energy = kinetic_energy_of_body(body, m) + scene%potential(q, t)
+    end function total_energy_of_body
+
+    !> T + V of n bodies that are alike.
+    pure function total_energy_alike(body, scene, t, m, q) result(energy)
+        type(rigid_body), intent(in) :: body
+        class(group_scene), intent(in) :: scene
+        real(wp), intent(in) :: t
+        real(wp), contiguous, intent(in) :: m(:, :), q(:, :)
+        real(wp) :: energy
+
+        energy = total_energy_of_group([body], scene, t, m, q)
+    end function total_energy_alike
+
+    !> T + V of n bodies.
+    pure function total_energy_of_group(body, scene, t, m, q) result(energy)
+        type(rigid_body), intent(in) :: body(:)
+        class(group_scene), intent(in) :: scene
+        real(wp), intent(in) :: t
+        real(wp), contiguous, intent(in) :: m(:, :), q(:, :)
+        real(wp) :: energy
+
+        energy = kinetic_energy_of_group(body, m) + scene%potential(q, t)
+    end function total_energy_of_group
+
+    !> Q m of one body.
+    pure function spatial_momentum_of_body(m, q) result(momentum)
+        real(wp), intent(in) :: m(3), q(4)
+        real(wp) :: momentum(3)
+
+        momentum = quat_rotate(q, m)
+    end function spatial_momentum_of_body
+
+    !> Sum of Q m over n bodies.
+    pure function spatial_momentum_of_group(m, q) result(momentum)
+        real(wp), intent(in) :: m(:, :), q(:, :)
+        real(wp) :: momentum(3)
+        integer :: i
+
+        momentum = 0.0_wp
+        do i = 1, size(m, 2)
+            momentum = momentum + quat_rotate(q(:, i), m(:, i))
+        end do
+    end function spatial_momentum_of_group
+
+    !> Takes the values at the start as those to be kept, and keeps the largest departures from them.
+    subroutine monitor_body(self, step, t, m, q)
+        class(invariant_monitor), intent(inout) :: self
+        integer, intent(in) :: step
+        real(wp), intent(in) :: t, m(3), q(4)
+        real(wp) :: energy, momentum
+
+        momentum = dot_product(self%axis, quat_rotate(q, m))
+        energy = kinetic_energy_of_body(self%body, m)
+        if (allocated(self%scene)) energy = energy + self%scene%potential(q, t)
+        if (step == 0) then
+            self%energy = energy
+            self%momentum = momentum
+            self%energy_error = 0.0_wp
+            self%momentum_error = 0.0_wp
+            self%norm_error = 0.0_wp
+        end if
+        self%energy_error = max(self%energy_error, abs(energy - self%energy))
+        self%momentum_error = max(self%momentum_error, abs(momentum - self%momentum))
+        self%norm_error = max(self%norm_error, abs(norm_defect(q)))
+    end subroutine monitor_body
+
+end module frb_invariants

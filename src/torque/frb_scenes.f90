@@ -1,0 +1,113 @@
+!> Scenes that come with the library: a heavy top, and a wrapper around a user's plain procedures.
+module frb_scenes
+    use frb_kinds, only: wp
+    use frb_rotations, only: quat_rotate
+    use frb_torque, only: body_scene
+    use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
+    implicit none
+    private
+
+    public :: heavy_top, plain_scene, plain_torque, plain_potential
+
+    !> A body with a fixed point under a constant force at one of its points: V = force . Q centre.
+    !> The paper's heavy top (section 4.3) has force = u0 and centre = e3.
+    type, extends(body_scene) :: heavy_top
+        real(wp) :: force(3) = [0.0_wp, 0.0_wp, 1.0_wp]     !! gradient of V, in space
+        real(wp) :: centre(3) = [0.0_wp, 0.0_wp, 1.0_wp]    !! point it acts at, in the body
+    contains
+        procedure :: torque => heavy_top_torque
+        procedure :: potential => heavy_top_potential
+    end type heavy_top
+
+    !> A scene made of plain procedures, for a torque without parameters: plain_scene(torque, potential).
+    type, extends(body_scene) :: plain_scene
+        procedure(plain_torque), pointer, nopass :: torque_of => null()
+        procedure(plain_potential), pointer, nopass :: potential_of => null()   !! may stay null
+    contains
+        procedure :: torque => plain_scene_torque
+        procedure :: potential => plain_scene_potential
+    end type plain_scene
+
+    abstract interface
+        !> The torque at attitude q and time t, in the body frame.
+        pure subroutine plain_torque(q, t, tau)
+            import :: wp
+            implicit none
+            real(wp), intent(in) :: q(4)
+            real(wp), intent(in) :: t
+            real(wp), intent(out) :: tau(3)
+        end subroutine plain_torque
+
+        !> The potential energy at attitude q and time t.
+        pure function plain_potential(q, t) result(v)
+            import :: wp
+            implicit none
+            real(wp), intent(in) :: q(4)
+            real(wp), intent(in) :: t
+            real(wp) :: v
+        end function plain_potential
+    end interface
+
+contains
+
+    !> u x centre with u = Q^T force; for the paper's top (u2, -u1, 0).
+    pure subroutine heavy_top_torque(self, q, t, tau)
+        class(heavy_top), intent(in) :: self
+        real(wp), intent(in) :: q(4), t
+        real(wp), intent(out) :: tau(3)
+
+        real(wp) :: u1, u2, u3, w1, w2, w3
+
+        associate (unused_t => t)
+        end associate
+        ! Written out: a call of quat_rotate would cost more than the arithmetic. w = 2 f x q, u = f + q0 w +
+        ! w x q.
+        w1 = 2*(self%force(2)*q(4) - self%force(3)*q(3))
+        w2 = 2*(self%force(3)*q(2) - self%force(1)*q(4))
+        w3 = 2*(self%force(1)*q(3) - self%force(2)*q(2))
+        u1 = self%force(1) + q(1)*w1 + (w2*q(4) - w3*q(3))
+        u2 = self%force(2) + q(1)*w2 + (w3*q(2) - w1*q(4))
+        u3 = self%force(3) + q(1)*w3 + (w1*q(3) - w2*q(2))
+        tau(1) = u2*self%centre(3) - u3*self%centre(2)
+        tau(2) = u3*self%centre(1) - u1*self%centre(3)
+        tau(3) = u1*self%centre(2) - u2*self%centre(1)
+    end subroutine heavy_top_torque
+
+    !> V = force . Q centre.
+    pure function heavy_top_potential(self, q, t) result(v)
+        class(heavy_top), intent(in) :: self
+        real(wp), intent(in) :: q(4), t
+        real(wp) :: v
+
+        associate (unused_t => t)
+        end associate
+        v = dot_product(self%force, quat_rotate(q, self%centre))
+    end function heavy_top_potential
+
+    !> The user's torque; NaN, which `integrate` refuses, when there is none.
+    pure subroutine plain_scene_torque(self, q, t, tau)
+        class(plain_scene), intent(in) :: self
+        real(wp), intent(in) :: q(4), t
+        real(wp), intent(out) :: tau(3)
+
+        if (associated(self%torque_of)) then
+            call self%torque_of(q, t, tau)
+        else
+            tau = ieee_value(tau, ieee_quiet_nan)
+        end if
+    end subroutine plain_scene_torque
+
+    !> The user's potential; NaN when there is none.
+    pure function plain_scene_potential(self, q, t) result(v)
+        class(plain_scene), intent(in) :: self
+        real(wp), intent(in) :: q(4), t
+        real(wp) :: v
+
+        if (associated(self%potential_of)) then
+            v = self%potential_of(q, t)
+        else
+            v = ieee_value(v, ieee_quiet_nan)
+        end if
+    end function plain_scene_potential
+
+end module frb_scenes

@@ -1,0 +1,275 @@
+!> Scenes, observers and drifts the suites of the torque layer share, and tops with known end values.
+module frb_torque_cases
+    use frb_free_flow, only: free_flow
+    use frb_inertia, only: rigid_body
+    use frb_kinds, only: wp
+    use frb_rotations, only: cross, quat_conjugate, quat_rotate
+    use frb_scenes, only: heavy_top
+    use frb_status, only: status_bad_option
+    use frb_torque, only: body_scene, group_scene, body_observer, group_observer, body_drift
+    use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
+    implicit none
+    private
+
+    public :: top_case, known_top, distance, recorder, group_recorder, pulsed_torque, spoilt_torque, &
+        plain_drift, failing_drift, dipoles, many_tops
+
+    !> A heavy top with its start and its end after the time t, to 25 digits (data/reference/make_tops.py).
+    type :: top_case
+        type(rigid_body) :: body
+        type(heavy_top) :: top
+        real(wp) :: t = 0.0_wp
+        real(wp) :: m0(3) = 0.0_wp
+        real(wp) :: q0(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+        real(wp) :: m(3) = 0.0_wp
+        real(wp) :: q(4) = 0.0_wp
+    end type top_case
+
+    !> Keeps every state it is shown.
+    type, extends(body_observer) :: recorder
+        integer :: count = 0
+        integer, allocatable :: step(:)
+        real(wp), allocatable :: t(:), m(:, :), q(:, :)
+    contains
+        procedure :: observe => record
+    end type recorder
+
+    !> Counts what it is shown and keeps the last state.
+    type, extends(group_observer) :: group_recorder
+        integer :: count = 0
+        integer :: step = -1
+        real(wp) :: t = -1.0_wp
+        real(wp), allocatable :: m(:, :), q(:, :)
+    contains
+        procedure :: observe => record_group
+    end type group_recorder
+
+    !> Torque cos(t) about axis 3, whatever the attitude.
+    type, extends(body_scene) :: pulsed_torque
+    contains
+        procedure :: torque => pulsed
+    end type pulsed_torque
+
+    !> No torque, until it is NaN from a certain time on.
+    type, extends(body_scene) :: spoilt_torque
+        real(wp) :: until = 0.0_wp
+    contains
+        procedure :: torque => spoilt
+    end type spoilt_torque
+
+    !> The free flow again, as a drift of the user's.
+    type, extends(body_drift) :: plain_drift
+    contains
+        procedure :: advance => advance_plainly
+    end type plain_drift
+
+    !> A drift that gives up.
+    type, extends(body_drift) :: failing_drift
+    contains
+        procedure :: advance => give_up
+    end type failing_drift
+
+    !> Dipoles along body axis 3, on a line in space, in each other's field.
+    type, extends(group_scene) :: dipoles
+        real(wp) :: strength = 0.05_wp
+        real(wp) :: spoilt_from = huge(1.0_wp)      ! NaN from this time on
+    contains
+        procedure :: torques => dipole_torques
+        procedure :: potential => dipole_potential
+    end type dipoles
+
+    !> Heavy tops that do not see each other.
+    type, extends(group_scene) :: many_tops
+        type(heavy_top) :: top
+    contains
+        procedure :: torques => torques_of_tops
+    end type many_tops
+
+contains
+
+    !> 1: the paper's top, t = 20; 2 and 3: Hairer and Vilmart's asymmetric and flat body with weight, t = 10.
+    function known_top(number) result(item)
+        integer, intent(in) :: number
+        type(top_case) :: item
+
+        item%m0 = [1.8_wp, 0.4_wp, -0.9_wp]
+        item%t = 10.0_wp
+        select case (number)
+        case (1)
+            item%body = rigid_body([1.0_wp, 1.0126869887825154_wp, 3.3062374224730378_wp])
+            item%top%force = [9.5586303547238536e-05_wp, 4.8777318247201465e-04_wp, &
+                              -8.6772148817192390e-04_wp]
+            item%m0 = [-3.4790957088547336e-01_wp, -1.9822914599675923e-01_wp, -9.1633189192763642e-01_wp]
+            item%t = 20.0_wp
+            item%m = [-0.3665884540247977060464576_wp, -0.1586967642476327008623542_wp, &
+                      -0.916459835775987002285299_wp]
+            item%q = [-0.8932047759654108019205434_wp, 0.1767070699549733365482911_wp, &
+                      0.09444301415131595388439478_wp, 0.4025423663398956965216831_wp]
+        case (2)
+            item%body = rigid_body([0.6_wp, 0.8_wp, 1.0_wp])
+            item%m = [1.922573381663007023978764_wp, 0.7720232344670847864095929_wp, &
+                      -0.2011054792035490068793853_wp]
+            item%q = [0.9257399890934638143427711_wp, -0.351490667972754483791524_wp, &
+                      0.1021838760186522953497751_wp, -0.09496440597984625829486457_wp]
+        case default
+            item%body = rigid_body([0.345_wp, 0.653_wp, 1.0_wp])
+            item%m = [1.912382242821367087460918_wp, 1.392718886527803301572865_wp, &
+                      0.9352825065552334909928896_wp]
+            item%q = [-0.01116176735384536570224578_wp, -0.933244738088256104306539_wp, &
+                      -0.359037465977168255346088_wp, -0.004666026662444763974661153_wp]
+        end select
+    end function known_top
+
+    !> Distance of two states, Euclidean; q and -q are the same attitude.
+    pure function distance(m, q, m_ref, q_ref) result(d)
+        real(wp), intent(in) :: m(3), q(4), m_ref(3), q_ref(4)
+        real(wp) :: d
+
+        d = sqrt(sum((m - m_ref)**2) + min(sum((q - q_ref)**2), sum((q + q_ref)**2)))
+    end function distance
+
+    subroutine record(self, step, t, m, q)
+        class(recorder), intent(inout) :: self
+        integer, intent(in) :: step
+        real(wp), intent(in) :: t, m(3), q(4)
+
+        if (.not. allocated(self%t)) then
+            allocate (self%step(2000), self%t(2000), self%m(3, 2000), self%q(4, 2000))
+        end if
+        self%count = self%count + 1
+        self%step(self%count) = step
+        self%t(self%count) = t
+        self%m(:, self%count) = m
+        self%q(:, self%count) = q
+    end subroutine record
+
+    subroutine record_group(self, step, t, m, q)
+        class(group_recorder), intent(inout) :: self
+        integer, intent(in) :: step
+        real(wp), intent(in) :: t
+        real(wp), contiguous, intent(in) :: m(:, :), q(:, :)
+
+        self%count = self%count + 1
+        self%step = step
+        self%t = t
+        self%m = m
+        self%q = q
+    end subroutine record_group
+
+    pure subroutine pulsed(self, q, t, tau)
+        class(pulsed_torque), intent(in) :: self
+        real(wp), intent(in) :: q(4), t
+        real(wp), intent(out) :: tau(3)
+
+        associate (unused_self => self, unused_q => q)
+        end associate
+        tau = [0.0_wp, 0.0_wp, cos(t)]
+    end subroutine pulsed
+
+    pure subroutine spoilt(self, q, t, tau)
+        class(spoilt_torque), intent(in) :: self
+        real(wp), intent(in) :: q(4), t
+        real(wp), intent(out) :: tau(3)
+
+        associate (unused_q => q)
+        end associate
+        tau = 0.0_wp
+        if (t >= self%until) tau(2) = ieee_value(t, ieee_quiet_nan)
+    end subroutine spoilt
+
+    subroutine advance_plainly(self, body, h, m, q, stat)
+        class(plain_drift), intent(in) :: self
+        type(rigid_body), intent(in) :: body
+        real(wp), intent(in) :: h
+        real(wp), intent(inout) :: m(3), q(4)
+        integer, intent(out) :: stat
+
+        associate (unused_self => self)
+        end associate
+        call free_flow(body, h, m, q, stat)
+    end subroutine advance_plainly
+
+    subroutine give_up(self, body, h, m, q, stat)
+        class(failing_drift), intent(in) :: self
+        type(rigid_body), intent(in) :: body
+        real(wp), intent(in) :: h
+        real(wp), intent(inout) :: m(3), q(4)
+        integer, intent(out) :: stat
+
+        associate (unused_self => self, unused_body => body)
+        end associate
+        m = m + h
+        q = q + h
+        stat = status_bad_option
+    end subroutine give_up
+
+    !> tau_i = Q_i^T (p_i x E_i), E_i the field of the others at centre i; p = Q e3, centres (j, 0, 0).
+    pure subroutine dipole_torques(self, q, t, tau)
+        class(dipoles), intent(in) :: self
+        real(wp), contiguous, intent(in) :: q(:, :)
+        real(wp), intent(in) :: t
+        real(wp), contiguous, intent(out) :: tau(:, :)
+        real(wp) :: p(3, size(q, 2))
+        integer :: i
+
+        p = moments_in_space(q)
+        do i = 1, size(q, 2)
+            tau(:, i) = quat_rotate(quat_conjugate(q(:, i)), cross(p(:, i), self%strength*field(p, i)))
+        end do
+        if (t >= self%spoilt_from) tau(3, :) = ieee_value(t, ieee_quiet_nan)
+    end subroutine dipole_torques
+
+    !> V = -1/2 sum of p_i . E_i.
+    pure function dipole_potential(self, q, t) result(v)
+        class(dipoles), intent(in) :: self
+        real(wp), contiguous, intent(in) :: q(:, :)
+        real(wp), intent(in) :: t
+        real(wp) :: v
+        real(wp) :: p(3, size(q, 2))
+        integer :: i
+
+        associate (unused_t => t)
+        end associate
+        p = moments_in_space(q)
+        v = 0.0_wp
+        do i = 1, size(q, 2)
+            v = v - 0.5_wp*self%strength*dot_product(p(:, i), field(p, i))
+        end do
+    end function dipole_potential
+
+    pure function moments_in_space(q) result(p)
+        real(wp), intent(in) :: q(:, :)
+        real(wp) :: p(3, size(q, 2))
+        integer :: i
+
+        do i = 1, size(q, 2)
+            p(:, i) = quat_rotate(q(:, i), [0.0_wp, 0.0_wp, 1.0_wp])
+        end do
+    end function moments_in_space
+
+    !> Field at centre i of unit dipoles p on the x axis: (3 x (x . p) - p)/r^3.
+    pure function field(p, i) result(e)
+        real(wp), intent(in) :: p(:, :)
+        integer, intent(in) :: i
+        real(wp) :: e(3)
+        integer :: j
+
+        e = 0.0_wp
+        do j = 1, size(p, 2)
+            if (j /= i) e = e + ([3.0_wp, 0.0_wp, 0.0_wp]*p(1, j) - p(:, j))/abs(real(i - j, wp))**3
+        end do
+    end function field
+
+    pure subroutine torques_of_tops(self, q, t, tau)
+        class(many_tops), intent(in) :: self
+        real(wp), contiguous, intent(in) :: q(:, :)
+        real(wp), intent(in) :: t
+        real(wp), contiguous, intent(out) :: tau(:, :)
+        integer :: i
+
+        do i = 1, size(q, 2)
+            call self%top%torque(q(:, i), t, tau(:, i))
+        end do
+    end subroutine torques_of_tops
+
+end module frb_torque_cases
