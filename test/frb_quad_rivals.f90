@@ -42,3 +42,14 @@ module frb_quad_truth
     include '../app/charts/rivals/taylor.inc'
 
 end module frb_quad_truth
+
+module frb_quad_top
+    use, intrinsic :: iso_fortran_env, only: qp => real128
+    implicit none
+    private
+
+    public :: taylor_top
+
+    include '../app/charts/rivals/taylor_top.inc'
+
+end module frb_quad_top

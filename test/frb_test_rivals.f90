@@ -5,6 +5,7 @@ module frb_test_rivals
     use frb_kinds, only: wp
     use frb_quad_dmv, only: rk, dmv_body, new_dmv_body, dmv_steps
     use frb_quad_rotations, only: rotation_steps
+    use frb_quad_top, only: taylor_top
     use frb_quad_runge_kutta, only: rk4_steps, dormand_prince
     use frb_quad_truth, only: taylor_flow, taylor_period, long_truth
     implicit none
@@ -26,8 +27,9 @@ contains
     subroutine test_rivals(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('rivals', 20)
+        call t%open_suite('rivals', 25)
         call check_truth(t)
+        call check_top(t)
         call check_orders(t)
         call t%close_suite()
     end subroutine test_rivals
@@ -80,6 +82,48 @@ contains
         call taylor_flow(body, time, m, q)
         call t%at_most(name, real(max(norm2(m - m_end), apart(q, q_end)), wp), tolerance_truth*10)
     end subroutine end_values
+
+    !> What a heavy top conserves, in body terms: energy with V = u3, and u . m with u = Q^T u0.
+    subroutine check_top(t)
+        type(tally), intent(inout) :: t
+        real(rk), parameter :: u0(3) = [0.3_rk, -0.2_rk, 0.9_rk]
+        real(rk) :: m(3), q(4), m_free(3), q_free(4), u(3)
+
+        m = m0
+        q = identity
+        call taylor_top(moments, u0, 10.0_rk, m, q)
+        u = into_body(q, u0)
+        call t%at_most('top-conserves-energy', real(abs(sum((m**2 - m0**2)/moments)/2 + u(3) - u0(3)), wp), &
+                       tolerance_truth)
+        call t%at_most('top-conserves-momentum-along-the-force', &
+                       real(abs(dot_product(u, m) - dot_product(u0, m0)), wp), tolerance_truth)
+        call taylor_top(moments, u0, -10.0_rk, m, q)
+        call t%at_most('top-run-back-returns-to-its-start', real(max(norm2(m - m0), apart(q, identity)), wp), &
+                       10*tolerance_truth)
+        m = m0
+        q = identity
+        m_free = m0
+        q_free = identity
+        call taylor_top(moments, 0*u0, 10.0_rk, m, q)
+        call taylor_flow(moments, 10.0_rk, m_free, q_free)
+        call t%at_most('top-without-force-is-free', real(max(norm2(m - m_free), apart(q, q_free)), wp), &
+                       tolerance_truth)
+        ! An axisymmetric top under the force along its axis also keeps the momentum about that axis.
+        m = m0
+        call taylor_top([0.8_rk, 0.8_rk, 1.0_rk], u0, 10.0_rk, m, q)
+        call t%at_most('symmetric-top-conserves-momentum-along-its-axis', real(abs(m(3) - m0(3)), wp), &
+                       tolerance_truth)
+    end subroutine check_top
+
+    !> Q^T v, from the rotation matrix.
+    pure function into_body(q, v) result(u)
+        real(rk), intent(in) :: q(4), v(3)
+        real(rk) :: u(3)
+
+        u(1) = (1 - 2*(q(3)**2 + q(4)**2))*v(1) + 2*(q(2)*q(3) + q(1)*q(4))*v(2) + 2*(q(2)*q(4) - q(1)*q(3))*v(3)
+        u(2) = 2*(q(2)*q(3) - q(1)*q(4))*v(1) + (1 - 2*(q(2)**2 + q(4)**2))*v(2) + 2*(q(3)*q(4) + q(1)*q(2))*v(3)
+        u(3) = 2*(q(2)*q(4) + q(1)*q(3))*v(1) + 2*(q(3)*q(4) - q(1)*q(2))*v(2) + (1 - 2*(q(2)**2 + q(3)**2))*v(3)
+    end function into_body
 
     !> Errors at t = 1 with n and 2 n steps.
     subroutine check_orders(t)

@@ -3,7 +3,8 @@
 module frb_chart_failure
     use frb, only: wp
     use frb_chart_methods, only: method, catalogue, style, family_momentum, family_dp
-    use frb_chart_output, only: settings, open_table, open_script, draw, progress, quantile, say, uniform, random_direction
+    use frb_chart_output, only: settings, open_table, open_script, draw, progress, quantile, say, either, &
+        uniform, random_direction
     use frb_chart_truth, only: free_case, new_case, add_sensitivity, errors_of
     use, intrinsic :: iso_fortran_env, only: int64
     implicit none
@@ -190,22 +191,21 @@ contains
             'quat_step-2', 'frb_step-10', 'quat_step-f3', 'quat_step-f2', 'quat_step', 'frb_step', 'flow-batch', 'flow']
         integer :: unit, p, i, j, entries
 
-        call open_script(options, 'failure', 1000, 1180, unit)
+        call open_script(options, 'failure', 1000, 1060, unit)
         write (unit, '(a)') 'set multiplot', 'set logscale xy', 'set format y "10^{%T}"', &
             'set yrange [5e-3:1e19]', 'set ytics 1,1e4', &
             'set ytics add ("NaN" 1e18)', 'unset key', &
-            'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0', 'set size 0.265,0.205'
+            'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0', 'set size 0.25,0.195'
         do p = 1, panels
             if (p == 9) then
                 write (unit, '(a)') 'set xrange [3e-9:3e8]', 'set xtics ("10^{-8}" 1e-8, "10^{-4}" 1e-4, "1" 1, '// &
                     '"10^4" 1e4, "10^8" 1e8)'
             else
-                write (unit, '(a)') 'set xrange [0.3:3e-18] reverse', 'set xrange [0.3:3e-18]', &
+                write (unit, '(a)') 'set xrange [0.3:3e-18]', &
                     'set xtics ("0" 1e-17, "10^{-15}" 1e-15, "10^{-10}" 1e-10, "10^{-5}" 1e-5, "10^{-1}" 1e-1)'
             end if
-            write (unit, '(a,f6.4,a,f6.4)') 'set origin ', 0.085 + 0.31*mod(p - 1, 3), ',', 0.76 - 0.245*((p - 1)/3)
-            write (unit, '(a)') merge('set ylabel "error  [units]" offset 1.2,0', 'unset ylabel                            ', &
-                                      mod(p, 3) == 1)
+            write (unit, '(a,f6.4,a,f6.4)') 'set origin ', 0.075 + 0.315*mod(p - 1, 3), ',', 0.77 - 0.265*((p - 1)/3)
+            write (unit, '(a)') either(mod(p, 3) == 1, 'set ylabel "error  [units]" offset 1.2,0', 'unset ylabel')
             write (unit, '(a)') 'set title "'//trim(titles(p))//'" offset 0,-0.7', 'plot \', &
                 '  4 with filledcurves y1=1e-3 lc rgb "#eeeeee" notitle, \'
             do j = 1, size(shown)
@@ -216,9 +216,9 @@ contains
             end do
             write (unit, '(a)') '  NaN notitle'
         end do
-        write (unit, '(a)') 'set origin 0.03,0.01', 'set size 0.94,0.18', 'unset border', 'unset tics', &
+        write (unit, '(a)') 'set origin 0.03,0.005', 'set size 0.94,0.17', 'unset border', 'unset tics', &
             'unset ylabel', 'unset title', 'unset grid', 'unset logscale', 'set xrange [0:1]', 'set yrange [0:1]', &
-            'set key center center maxrows 4 samplen 2.2 spacing 1.2', &
+            'set key center center maxrows 4 samplen 2.2 spacing 1.2 Left reverse', &
             'plot NaN with boxes fs solid noborder lc rgb "#eeeeee" title "up to 4 units", \'
         entries = 0
         do j = size(shown), 1, -1

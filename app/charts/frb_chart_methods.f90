@@ -9,7 +9,7 @@ module frb_chart_methods
     implicit none
     private
 
-    public :: method, catalogue, find_method, style, advance
+    public :: method, catalogue, find_method, known, style, advance
     public :: family_flow, family_batch, family_momentum, family_matrix, family_paper_q, family_paper_a
     public :: family_dmv, family_rotations, family_rk4, family_dp
 
@@ -111,6 +111,16 @@ contains
         write (error_unit, '(a)') 'frb_charts: no such method: '//key
         error stop 1
     end function find_method
+
+    !> Whether the catalogue has a method with this key.
+    function known(key) result(there)
+        character(*), intent(in) :: key
+        logical :: there
+        type(method), allocatable :: methods(:)
+
+        allocate (methods, source=catalogue())
+        there = any(methods%key == key)
+    end function known
 
     !> The end of a gnuplot plot clause: line, symbol and title of a method's curve.
     function style(with, label) result(clause)

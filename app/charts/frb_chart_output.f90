@@ -7,7 +7,7 @@ module frb_chart_output
     implicit none
     private
 
-    public :: settings, open_table, open_script, draw, progress, say, sorted, quantile, uniform, random_direction
+    public :: settings, open_table, open_script, draw, progress, say, either, sorted, quantile, uniform, random_direction
 
     !> What the command line asks for.
     type :: settings
@@ -31,7 +31,7 @@ contains
 
         open (newunit=unit, file=options%folder//'/'//name//'.dat', status='replace', action='write')
         write (unit, '(a)') '# '//title
-        write (unit, '(a)') '# made by: fpm run frb_charts'//trim(merge(' (--quick)', '          ', options%quick))
+        write (unit, '(a)') '# made by: frb_charts'//either(options%quick, ' --quick', '')
         write (unit, '(a)') '# processor: '//processor()
         write (unit, '(a)') '# compiler: '//compiler_version()
         write (unit, '(a)') '# flags: '//flags()
@@ -84,6 +84,19 @@ contains
         write (*, '(a)') line
         flush (6)
     end subroutine say
+
+    !> One text or the other.
+    pure function either(condition, yes, no) result(text)
+        logical, intent(in) :: condition
+        character(*), intent(in) :: yes, no
+        character(:), allocatable :: text
+
+        if (condition) then
+            text = yes
+        else
+            text = no
+        end if
+    end function either
 
     !> How far a chart has come, on one line of the terminal.
     subroutine progress(options, what, done, of)

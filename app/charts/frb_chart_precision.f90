@@ -4,7 +4,8 @@ module frb_chart_precision
     use frb, only: wp
     use frb_chart_methods, only: method, catalogue, style, family_flow, family_batch, family_momentum, &
         family_matrix, family_dp
-    use frb_chart_output, only: settings, open_table, open_script, draw, progress, quantile, uniform, random_direction
+    use frb_chart_output, only: settings, open_table, open_script, draw, progress, either, &
+        quantile, uniform, random_direction
     use frb_chart_timing, only: workload, new_workload, time_in_turn
     use frb_chart_truth, only: free_case, new_case, errors_of
     use, intrinsic :: iso_fortran_env, only: int64
@@ -158,10 +159,12 @@ contains
                 end do
             end do
             if (place(1) == 0) exit
+            if (last_time <= 0.0_wp) write (unit, '(2es13.4,a)') time, best_error, ' top'
             best_error = max(floor_of_errors, points(place(1), place(2))%error_q)
             last_time = time
             write (unit, '(2es13.4,1x,a)') time, best_error, trim(methods(place(2))%key)
         end do
+        write (unit, '(2es13.4,a)') 1.0e9_wp, best_error, ' right'
     end subroutine write_points
 
     subroutine draw_work_precision(options, methods, names, bodies)
@@ -174,28 +177,28 @@ contains
 
         call open_script(options, 'work-precision', 1000, 940, unit)
         write (unit, '(a)') 'set multiplot', 'set logscale xy', 'set format x "10^{%T}"', 'set format y "10^{%T}"', &
-            'set yrange [1e-17:10]', 'set xrange [30:5e6]', 'set ytics 1e-16,1e2', &
+            'set yrange [1e-16:30]', 'set xrange [50:5e6]', 'set ytics 1e-16,1e2', &
             'set xlabel "time spent to reach t = 10  [ns]" offset 0,0.4', 'set ylabel "error of attitude  [rad]"', &
             'unset key', 'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0'
         do b = 1, size(names)
-            write (title, '(a,3f7.3,a)') ': I = (', bodies(:, b), ')'
+            write (title, '(a,2(f5.3,a),f5.3,a)') ': I = (', bodies(1, b), ', ', bodies(2, b), ', ', bodies(3, b), ')'
             write (unit, '(a)') 'set title "'//trim(names(b))//' body'//trim(title)//'" offset 0,-0.6'
             write (unit, '(a,f5.3,a,f5.3)') 'set origin ', merge(0.08, 0.58, mod(b, 2) == 1), ',', &
                 merge(0.56, 0.07, b < 3)
             write (unit, '(a)') 'set size 0.40,0.40', 'plot \'
             write (unit, '(a,i0,a)') '  "work-precision-'//trim(names(b))//'.dat" index ', size(methods), &
-                ' using 1:2 with steps lc rgb "#dddddd" lw 12 notitle, \'
+                ' using 1:2 with steps lc rgb "#dddddd" lw 10 notitle, \'
             do i = size(methods), 1, -1
                 write (unit, '(a,i0,a)') '  "work-precision-'//trim(names(b))//'.dat" index ', i - 1, &
-                    ' using 2:5'//style(methods(i), '')//trim(merge('    ', ', \ ', i == 1))
+                    ' using 2:5'//style(methods(i), '')//either(i == 1, '', ', \')
             end do
         end do
         write (unit, '(a)') 'set origin 0.53,0.05', 'set size 0.47,0.45', 'unset border', 'unset tics', 'unset xlabel', &
             'unset ylabel', 'unset title', 'unset grid', 'unset logscale', 'set xrange [0:1]', 'set yrange [0:1]', &
-            'set key center center maxrows 12 samplen 2.2 spacing 1.1 width -2', 'plot NaN with lines lc rgb "#dddddd" lw 12 '// &
-            'title "lower left envelope", \'
+            'set key center center maxrows 12 samplen 2.2 spacing 1.1 Left reverse', 'plot \', &
+            '  NaN with lines lc rgb "#dddddd" lw 10 title "lower left envelope", \'
         do i = 1, size(methods)
-            write (unit, '(a)') '  NaN'//style(methods(i))//trim(merge('    ', ', \ ', i == size(methods)))
+            write (unit, '(a)') '  NaN'//style(methods(i))//either(i == size(methods), '', ', \')
         end do
         write (unit, '(a)') 'unset multiplot'
         close (unit)
@@ -252,7 +255,7 @@ contains
             'set xrange [0.8:1.2e6]', 'set yrange [1e-17:10]', 'set xlabel "number of steps to t = 16"', &
             'set ylabel "error of attitude, median of 9 bodies  [rad]"', &
             'set title "Cutting the same time into more steps"', &
-            'set key outside right center vertical spacing 1.1 samplen 2.2', 'plot \', &
+            'set key outside right center vertical spacing 1.1 samplen 2.2 Left reverse', 'plot \', &
             '  1.1e-16*sqrt(x) with lines lc rgb "#777777" lw 1 dt 3 title "2^{-53} {/Symbol \326}N", \', &
             '  1.1e-16*x with lines lc rgb "#777777" lw 1 dt 2 title "2^{-53} N", \'
         k = 0

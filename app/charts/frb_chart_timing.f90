@@ -9,7 +9,7 @@ module frb_chart_timing
     implicit none
     private
 
-    public :: workload, new_workload, time_in_turn
+    public :: workload, new_workload, time_in_turn, run, threads_there
 
     !> A method at work: a chain of steps of one body, or steps of many bodies.
     type :: workload
@@ -18,6 +18,7 @@ module frb_chart_timing
         real(wp) :: h = 1.0_wp
         integer :: bodies = 1
         integer :: nsteps = 1               !! steps per repetition
+        integer :: threads = 1              !! of the batch form; more than one needs -fopenmp
         integer :: rounds = 1               !! times the nsteps are taken, each from the start
         real(wp), allocatable :: m0(:, :)   !! (3, bodies)
         real(wp), allocatable :: m(:, :)
@@ -88,16 +89,18 @@ contains
         real(wp) :: seconds
         integer(int64) :: start, finish, rate
         integer :: pass
+        logical :: many
 
+        many = work%bodies > 1 .or. work%with%family == family_batch
         seconds = 0.0_wp
-        if (work%bodies > 1) then
+        if (many) then
             work%m = work%m0
             work%q = 0.0_wp
             work%q(1, :) = 1.0_wp
         end if
         call system_clock(start, rate)
         do pass = 1, work%rounds
-            if (work%bodies > 1) then
+            if (many) then
                 call advance_many(work)
             else
                 work%m(:, 1) = work%m0(:, 1)
@@ -109,18 +112,39 @@ contains
         seconds = real(finish - start, wp)/real(rate, wp)
     end function run
 
+    !> Threads this build can use: 1 without -fopenmp.
+    function threads_there() result(count)
+        !$ use omp_lib, only: omp_get_num_procs
+        integer :: count
+
+        count = 1
+        !$ count = omp_get_num_procs()
+    end function threads_there
+
     !> Every body takes nsteps steps; the bodies are independent, so nothing waits for the step before.
     subroutine advance_many(work)
+        !$ use omp_lib, only: omp_set_num_threads
         type(workload), intent(inout) :: work
         type(rigid_body) :: body
         type(dmv_body) :: rival
-        integer :: i, step
+        integer :: i, step, part, low, high
 
+        !$ call omp_set_num_threads(work%threads)
         select case (work%with%family)
         case (family_batch)
             body = rigid_body(work%moments)
             do step = 1, work%nsteps
-                call free_flow(body, work%h, work%m, work%q)
+                if (work%threads == 1) then
+                    call free_flow(body, work%h, work%m, work%q)
+                else
+                    !$omp parallel do private(low, high) schedule(static, 1)
+                    do part = 1, work%threads
+                        low = 1 + int((part - 1)*int(work%bodies, int64)/work%threads)
+                        high = int(part*int(work%bodies, int64)/work%threads)
+                        call free_flow(body, work%h, work%m(:, low:high), work%q(:, low:high))
+                    end do
+                    !$omp end parallel do
+                end if
             end do
         case (family_flow)
             body = rigid_body(work%moments)

@@ -3,11 +3,15 @@
 program frb_charts
     use frb_chart_cost, only: chart_cost, chart_speed
     use frb_chart_failure, only: chart_failure
+    use frb_chart_orbits, only: chart_orbits, chart_racket
     use frb_chart_output, only: settings, say
     use frb_chart_precision, only: chart_work_precision, chart_growth
+    use frb_chart_scale, only: chart_scale
+    use frb_chart_triangle, only: chart_triangle
     use, intrinsic :: iso_fortran_env, only: error_unit
     implicit none
-    character(*), parameter :: names(*) = [character(16) :: 'speed', 'cost', 'work-precision', 'failure', 'growth']
+    character(*), parameter :: names(*) = [character(16) :: 'speed', 'cost', 'work-precision', 'failure', 'growth', &
+        'triangle', 'scale', 'orbits']
     type(settings) :: options
     character(:), allocatable :: argument
     logical :: wanted(size(names))
@@ -60,6 +64,13 @@ program frb_charts
             call chart_failure(options)
         case ('growth')
             call chart_growth(options)
+        case ('triangle')
+            call chart_triangle(options)
+        case ('scale')
+            call chart_scale(options)
+        case ('orbits')
+            call chart_orbits(options)
+            call chart_racket(options)
         end select
     end do
 
@@ -84,6 +95,9 @@ contains
         call say('  work-precision  error at t = 10 against time spent, three bodies')
         call say('  failure         error against closeness to every place where methods fail')
         call say('  growth          error against the number of steps for the same time')
+        call say('  triangle        error of one step h = 1 over all shapes of a body')
+        call say('  scale           time per body against the number of bodies')
+        call say('  orbits          polhodes, the tennis racket')
         call say('--quick: a minute for all of them; --out DIR: where the tables, scripts and pictures go (charts)')
     end subroutine list_charts
 

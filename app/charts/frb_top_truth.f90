@@ -1,0 +1,11 @@
+!> The truth of the charts with torque: a heavy top by Taylor series in quadruple precision.
+module frb_top_truth
+    use, intrinsic :: iso_fortran_env, only: qp => real128
+    implicit none
+    private
+
+    public :: qp, taylor_top
+
+    include 'rivals/taylor_top.inc'
+
+end module frb_top_truth
