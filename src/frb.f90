@@ -7,6 +7,10 @@ module frb
     use frb_rotations, only: quat_product, quat_conjugate, quat_rotate, quat_to_matrix, matrix_to_quat
     use frb_inertia, only: rigid_body, principal_axes
     use frb_free_flow, only: free_flow
+    use frb_carlson, only: rf, rc, rj, rd
+    use frb_agm, only: ellip_k, ellip_f, jacobi_am, jacobi, landen_step
+    use frb_legendre, only: ellpi, ellint_pi, ellint_pi_between
+    use frb_quadrature, only: gauss_legendre, eint_gauss
     use frb_order_conditions, only: order_report, order_conditions
     use frb_schemes, only: splitting_scheme, scheme_names, mirrored
     use frb_torque, only: body_scene, group_scene, body_observer, group_observer, body_drift
@@ -22,6 +26,10 @@ module frb
     public :: status_bad_torque, status_bad_scheme, status_no_period, status_lapack_failed
     public :: quat_product, quat_conjugate, quat_rotate, quat_to_matrix, matrix_to_quat
     public :: rigid_body, principal_axes, free_flow
+    public :: rf, rc, rj, rd
+    public :: ellip_k, ellip_f, jacobi_am, jacobi, landen_step
+    public :: ellpi, ellint_pi, ellint_pi_between
+    public :: gauss_legendre, eint_gauss
     public :: splitting_scheme, scheme_names, mirrored, order_report, order_conditions
     public :: body_scene, group_scene, body_observer, group_observer, body_drift, heavy_top, plain_scene
     public :: integrate

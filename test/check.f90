@@ -6,6 +6,8 @@ program check
     use frb_test_base, only: test_base
     use frb_test_rivals, only: test_rivals
     use frb_test_files, only: test_files
+    use frb_test_carlson, only: test_carlson
+    use frb_test_agm, only: test_agm
     use frb_test_schemes, only: test_schemes
     use frb_test_splitting, only: test_splitting
     use frb_test_groups, only: test_groups
@@ -16,6 +18,8 @@ program check
     call test_base(t)
     call test_rivals(t)
     call test_files(t)
+    call test_carlson(t)
+    call test_agm(t)
     call test_schemes(t)
     call test_splitting(t)
     call test_groups(t)

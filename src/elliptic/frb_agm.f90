@@ -1,0 +1,379 @@
+!> Elliptic integral of the first kind and Jacobi elliptic functions by the arithmetic-geometric mean and
+!> Landen's transformation, section 3.2.
+!>
+!> The argument is the modulus k, 0 <= |k| <= 1, as in the paper. Close to k = 1 everything depends on
+!> 1 - k**2; each routine takes it as an optional kc2, so that nothing is lost there: k is then not used.
+!>
+!> The sequence a(n+1) = (a(n) + b(n))/2, b(n+1) = sqrt(a(n) b(n)) from a = 1, b = sqrt(1 - k**2) carries the
+!> amplitude by (17), tan(phi(n+1) - phi(n)) = (b(n)/a(n)) tan(phi(n)), and F(phi) = phi(N)/(2**N a(N)).
+!> Here it is written in y(n) = 2**n a(n) cot(phi(n)) and w(n) = sqrt(y(n)**2 + 4**n b(n)**2):
+!>
+!>     y(n+1) = y(n) - 4**n a(n) b(n)/y(n),      w(n+1) = y(n) + 4**n a(n) b(n)/y(n),
+!>
+!> so the step up costs a division, the step down, y(n) = (w(n+1) +- y(n+1))/2, a square root, and neither a
+!> tangent nor an arcsine; at the end y(0) = cn/sn and w(0) = dn/sn, without cancellation as k tends to 1.
+!> The half turns that the cotangent does not see are counted: their number doubles at each step up, plus
+!> one where y(n) < 0; on the way down their lowest bit gives the sign of y(n).
+module frb_agm
+    use frb_kinds, only: wp, pi, half_pi
+    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_value, ieee_quiet_nan, ieee_positive_inf
+    implicit none
+    private
+
+    public :: ellip_k, ellip_f, jacobi_am, jacobi, landen_step, half_turns
+
+    !> 1 - k**2 = 5e-324, the smallest above zero, takes 13 steps.
+    integer, parameter :: most_steps = 16
+
+    !> Once a and b agree to this they agree to rounding one step later: their distance is squared, over 8.
+    real(wp), parameter :: nearly_equal = 2.0e-8_wp
+
+    !> Below this an angle equals its sine, its integral F and its amplitude to rounding: u**3/6 < eps u/4.
+    real(wp), parameter :: small_angle = 1.0e-8_wp
+
+    !> Beyond this ratio of y(n) to y(n+1) an angle cannot be told from 0 or pi.
+    real(wp), parameter :: far = 1.0e20_wp
+
+    !> pi in two parts; the first has 30 bits, so that its product with a count below 2**23 is exact.
+    real(wp), parameter :: pi_high = 3.1415926516056060791015625_wp
+    real(wp), parameter :: pi_low = 1.9841871593610808832795e-9_wp
+
+    !> The sequence from 1 and sqrt(kc2), as far as it is needed.
+    type :: agm_sequence
+        integer :: steps = 0                  !! N
+        real(wp) :: mean = 1.0_wp             !! a(N)
+        real(wp) :: scale = 1.0_wp            !! 2**N
+        real(wp) :: product(0:most_steps)     !! 4**n a(n) b(n), n = 0..N-1
+        real(wp) :: square(0:most_steps)      !! 4**n b(n)**2, n = 0..N-1
+    end type agm_sequence
+
+contains
+
+    !> Complete integral of the first kind K(k) = F(pi/2, k).
+    !> Domain: |k| <= 1 (or 0 <= kc2 <= 1), outside: NaN. At k = 1: +Infinity.
+    !> Accuracy: 4 epsilon, relative; checked by agm: complete-integral-agrees-with-table.
+    !> Source: (19) with phi = pi/2; A&S 17.6.3.
+    elemental function ellip_k(k, kc2) result(value)
+        real(wp), intent(in) :: k                  !! modulus
+        real(wp), intent(in), optional :: kc2      !! 1 - k**2; k is then not used
+        real(wp) :: value
+        real(wp) :: complement, a, b, next
+        logical :: valid
+
+        call complement_of(k, kc2, complement, valid)
+        if (.not. valid) then
+            value = ieee_value(1.0_wp, ieee_quiet_nan)
+        else if (complement <= 0.0_wp) then
+            value = ieee_value(1.0_wp, ieee_positive_inf)
+        else
+            a = 1.0_wp
+            b = sqrt(complement)
+            do while (abs(a - b) > nearly_equal*a)
+                next = 0.5_wp*(a + b)
+                b = sqrt(a*b)
+                a = next
+            end do
+            value = pi/(a + b)
+        end if
+    end function ellip_k
+
+    !> Integral of the first kind F(phi, k) = int_0^phi dtheta/sqrt(1 - k**2 sin(theta)**2), (21).
+    !> Domain: any finite phi, |k| <= 1 (or 0 <= kc2 <= 1), outside: NaN. At k = 1: the inverse Gudermannian
+    !> within +-pi/2, +-Infinity beyond.
+    !> Accuracy: 6 epsilon, relative, times the change that half an ulp of phi makes where that is larger;
+    !> checked by agm: incomplete-integral-agrees-with-table.
+    !> Source: (17)-(19).
+    elemental function ellip_f(phi, k, kc2) result(value)
+        real(wp), intent(in) :: phi                !! amplitude [rad]
+        real(wp), intent(in) :: k                  !! modulus
+        real(wp), intent(in), optional :: kc2      !! 1 - k**2; k is then not used
+        real(wp) :: value
+        type(agm_sequence) :: agm
+        real(wp) :: complement, turns, rest
+        logical :: valid
+
+        call complement_of(k, kc2, complement, valid)
+        if (.not. (valid .and. ieee_is_finite(phi))) then
+            value = ieee_value(1.0_wp, ieee_quiet_nan)
+        else if (abs(phi) < small_angle) then
+            value = phi
+        else if (complement <= 0.0_wp) then
+            if (abs(phi) <= half_pi) then
+                value = asinh(tan(phi))
+            else
+                value = sign(ieee_value(1.0_wp, ieee_positive_inf), phi)
+            end if
+        else
+            call half_turns(phi, turns, rest)
+            call start_agm(complement, agm)
+            value = (turns*pi + scaled_angle(sin(rest), cos(rest), agm)/agm%scale)/agm%mean
+        end if
+    end function ellip_f
+
+    !> Amplitude am(u, k), the inverse of F(phi, k) in phi; continuous and increasing in u.
+    !> Domain: any finite u, |k| <= 1 (or 0 <= kc2 <= 1), outside: NaN. At k = 1: the Gudermannian.
+    !> Accuracy: 4 epsilon (|am| + |u| dn); checked by agm: amplitude-agrees-with-table.
+    elemental function jacobi_am(u, k, kc2) result(phi)
+        real(wp), intent(in) :: u                  !! argument
+        real(wp), intent(in) :: k                  !! modulus
+        real(wp), intent(in), optional :: kc2      !! 1 - k**2; k is then not used
+        real(wp) :: phi
+        real(wp) :: complement, sn, cn, dn
+        logical :: valid
+
+        call complement_of(k, kc2, complement, valid)
+        if (.not. (valid .and. ieee_is_finite(u))) then
+            phi = ieee_value(1.0_wp, ieee_quiet_nan)
+        else
+            call functions_at(u, complement, sn, cn, dn, phi)
+        end if
+    end function jacobi_am
+
+    !> Jacobi elliptic functions sn, cn, dn of u, any u.
+    !> Domain: any finite u, |k| <= 1 (or 0 <= kc2 <= 1), outside: NaN. At k = 1: tanh, sech, sech.
+    !> Accuracy: 4 epsilon (1 + |u| times the derivative); cn and dn keep relative accuracy as k tends to 1
+    !> and u grows. Checked by agm: jacobi-functions-agree-with-table.
+    elemental subroutine jacobi(u, k, sn, cn, dn, kc2)
+        real(wp), intent(in) :: u                  !! argument
+        real(wp), intent(in) :: k                  !! modulus
+        real(wp), intent(out) :: sn, cn, dn        !! sin(am u), cos(am u), sqrt(1 - k**2 sn**2)
+        real(wp), intent(in), optional :: kc2      !! 1 - k**2; k is then not used
+        real(wp) :: complement
+        logical :: valid
+
+        call complement_of(k, kc2, complement, valid)
+        if (.not. (valid .and. ieee_is_finite(u))) then
+            sn = ieee_value(1.0_wp, ieee_quiet_nan)
+            cn = sn
+            dn = sn
+        else
+            call functions_at(u, complement, sn, cn, dn)
+        end if
+    end subroutine jacobi
+
+    !> The momentum step of section 3.2 (EgellipX_step): from (sn0, cn0) at u0 to sn, cn, dn at u0 + du, and
+    !> the amplitudes phi0 = am(u0) in [-pi, pi] and phi1 = am(u0 + du), continuous with phi0, so that
+    !> phi1 - phi0 counts the turns. One sequence serves both transformations, from phi0 and
+    !> back from u0 + du.
+    !> sn0**2 + cn0**2 need not be one to rounding: only the angle counts, and sn0 = cn0 = 0 stands for 0.
+    !> At k = 1 the motion tends to sn = +-1; there cn keeps the sign of cn0, and cn0 = 0 stays at rest.
+    !> Domain: |k| <= 1 (or 0 <= kc2 <= 1), all arguments finite, |sn0|, |cn0| <= 1e100; outside: NaN.
+    !> Accuracy: as of `jacobi` at u0 + du; checked by agm: momentum-step-agrees-with-jacobi.
+    pure subroutine landen_step(sn0, cn0, du, k, sn, cn, dn, phi0, phi1, kc2)
+        real(wp), intent(in) :: sn0, cn0           !! sn and cn at the start
+        real(wp), intent(in) :: du                 !! change of the argument, lambda h
+        real(wp), intent(in) :: k                  !! modulus
+        real(wp), intent(out) :: sn, cn, dn        !! at the end
+        real(wp), intent(out) :: phi0, phi1        !! amplitudes at start and end [rad]
+        real(wp), intent(in), optional :: kc2      !! 1 - k**2; k is then not used
+        type(agm_sequence) :: agm
+        real(wp) :: complement
+        logical :: valid
+
+        call complement_of(k, kc2, complement, valid)
+        if (valid) valid = ieee_is_finite(sn0) .and. ieee_is_finite(cn0) .and. ieee_is_finite(du)
+        if (valid) valid = max(abs(sn0), abs(cn0)) <= 1.0e100_wp
+        if (.not. valid) then
+            sn = ieee_value(1.0_wp, ieee_quiet_nan)
+            cn = sn
+            dn = sn
+            phi0 = sn
+            phi1 = sn
+        else
+            phi0 = atan2(sn0, cn0)
+            if (complement > 0.0_wp) then
+                call start_agm(complement, agm)
+                call descend(scaled_angle(sn0, cn0, agm)/agm%scale, du, agm, sn, cn, dn, phi1)
+            else
+                call separatrix_step(sn0, cn0, du, sn, cn, phi1)
+                dn = abs(cn)
+            end if
+        end if
+    end subroutine landen_step
+
+    !> phi = turns pi + rest with a whole number of turns and |rest| <= pi/2.
+    !> An angle that is pi/2 as a number is below pi/2, so it keeps turns = 0.
+    !> Beyond 2**23 turns the library's own reduction of the tangent takes over.
+    elemental subroutine half_turns(phi, turns, rest)
+        real(wp), intent(in) :: phi
+        real(wp), intent(out) :: turns   !! a whole number, real since it may exceed any integer kind
+        real(wp), intent(out) :: rest
+
+        if (abs(phi) <= half_pi) then
+            turns = 0.0_wp
+            rest = phi
+        else
+            turns = anint(phi*(1/pi))
+            if (abs(turns) < 2.0_wp**23) then
+                rest = (phi - turns*pi_high) - turns*pi_low
+            else
+                rest = atan(tan(phi))
+                turns = anint((phi - rest)/pi)
+            end if
+        end if
+    end subroutine half_turns
+
+    ! ------------------------------------------------------------------------------------------ inner parts
+
+    !> 1 - k**2 from the arguments, and whether they are in the domain.
+    pure subroutine complement_of(k, kc2, complement, valid)
+        real(wp), intent(in) :: k
+        real(wp), intent(in), optional :: kc2
+        real(wp), intent(out) :: complement
+        logical, intent(out) :: valid
+
+        complement = 1.0_wp
+        if (present(kc2)) then
+            valid = ieee_is_finite(kc2)
+            if (valid) valid = kc2 >= 0.0_wp .and. kc2 <= 1.0_wp
+            if (valid) complement = kc2
+        else
+            valid = ieee_is_finite(k)
+            if (valid) valid = abs(k) <= 1.0_wp
+            if (valid) complement = (1 - k)*(1 + k)
+        end if
+    end subroutine complement_of
+
+    !> The sequence for 1 - k**2 = kc2 > 0, to the step where a and b agree to rounding.
+    pure subroutine start_agm(kc2, agm)
+        real(wp), intent(in) :: kc2
+        type(agm_sequence), intent(out) :: agm
+        real(wp) :: a, b, ab, next, power
+        integer :: n
+        logical :: last
+
+        a = 1.0_wp
+        b = sqrt(kc2)
+        power = 1.0_wp
+        do n = 0, most_steps - 1
+            ab = a*b
+            agm%product(n) = (power*power)*ab
+            agm%square(n) = (power*b)**2
+            last = abs(a - b) <= nearly_equal*a
+            next = 0.5_wp*(a + b)
+            b = sqrt(ab)
+            a = next
+            power = 2*power
+            if (last) exit
+        end do
+        agm%steps = min(n + 1, most_steps)
+        agm%scale = power
+        agm%mean = a
+    end subroutine start_agm
+
+    !> phi(N) for the angle phi(0) in [-pi, pi] with the given sine and cosine (up to a common factor).
+    pure function scaled_angle(sine, cosine, agm) result(angle)
+        real(wp), intent(in) :: sine, cosine
+        type(agm_sequence), intent(in) :: agm
+        real(wp) :: angle
+        real(wp) :: y, s, turns
+        integer :: n
+
+        s = abs(sine)
+        if (s <= small_angle*abs(cosine)) then
+            angle = 0.0_wp
+            if (s > 0.0_wp) angle = agm%scale*agm%mean*s/abs(cosine)
+            if (cosine < 0.0_wp) angle = agm%scale*pi - angle
+        else
+            y = cosine/s
+            turns = 0.0_wp
+            do n = 0, agm%steps - 1
+                if (abs(y) < agm%product(n)*(1/far)) y = agm%product(n)*(1/far)
+                turns = 2*turns
+                if (y < 0.0_wp) turns = turns + 1
+                y = y - agm%product(n)/y
+            end do
+            angle = turns*pi + atan2(agm%scale*agm%mean, y)
+        end if
+        angle = sign(angle, sine)
+    end function scaled_angle
+
+    !> sn, cn, dn and the amplitude at u, for 0 <= kc2 <= 1.
+    pure subroutine functions_at(u, kc2, sn, cn, dn, phi)
+        real(wp), intent(in) :: u, kc2
+        real(wp), intent(out) :: sn, cn, dn
+        real(wp), intent(out), optional :: phi
+        type(agm_sequence) :: agm
+
+        if (abs(u) < small_angle) then
+            sn = u
+            cn = 1.0_wp
+            dn = 1.0_wp
+            if (present(phi)) phi = u
+        else if (kc2 > 0.0_wp) then
+            call start_agm(kc2, agm)
+            call descend(0.0_wp, u, agm, sn, cn, dn, phi)
+        else
+            call separatrix_step(0.0_wp, 1.0_wp, u, sn, cn, phi)
+            dn = cn
+        end if
+    end subroutine functions_at
+
+    !> From phi(N)/2**N = start + a(N) du down to sn, cn, dn and, where asked for, the amplitude.
+    pure subroutine descend(start, du, agm, sn, cn, dn, phi)
+        real(wp), intent(in) :: start, du
+        type(agm_sequence), intent(in) :: agm
+        real(wp), intent(out) :: sn, cn, dn
+        real(wp), intent(out), optional :: phi
+        real(wp) :: angle, turns, rest, y, w, s, large, sense
+        integer :: n, count
+        logical :: negative
+
+        call half_turns(start + agm%mean*du, turns, rest)
+        sense = 1 - 2*abs(turns - 2*anint(0.5_wp*turns))   ! (-1)**turns
+        angle = agm%scale*abs(rest)
+        count = int(angle*(1/pi))
+        s = sin(angle)
+        y = cos(angle)
+        if (btest(count, 0)) then
+            s = -s
+            y = -y
+        end if
+        if (s < 0.0_wp) then   ! angle/pi is so close to a whole number that rounding chose the wrong one
+            s = -s
+            y = -y
+            count = count + merge(-1, 1, y < 0.0_wp)
+        end if
+        y = agm%scale*agm%mean*y/max(s, 1/far)
+        w = sqrt(y*y + (agm%scale*agm%mean)**2)
+        do n = agm%steps - 1, 0, -1
+            negative = btest(count, 0)
+            count = count/2
+            large = 0.5_wp*(w + abs(y))
+            if ((y < 0.0_wp) .neqv. negative) large = agm%product(n)/large
+            y = merge(-large, large, negative)
+            w = sqrt(y*y + agm%square(n))
+        end do
+        sn = 1/sqrt(1 + y*y)
+        cn = y*sn*sense
+        dn = w*sn
+        if (present(phi)) phi = turns*pi_high + (turns*pi_low + sign(atan2(1.0_wp, y), rest))
+        sn = sign(sn, rest)*sense
+    end subroutine descend
+
+    !> The step for k = 1: sn = tanh, cn = sech, amplitude the Gudermannian; on the branch cn < 0 the same
+    !> motion half a turn away.
+    pure subroutine separatrix_step(sn0, cn0, du, sn, cn, phi)
+        real(wp), intent(in) :: sn0, cn0, du
+        real(wp), intent(out) :: sn, cn
+        real(wp), intent(out), optional :: phi
+        real(wp) :: u, decay
+
+        if (abs(cn0) <= 1.0e-300_wp*abs(sn0)) then   ! at rest, or closer to it than a number can tell
+            sn = sign(1.0_wp, sn0)
+            cn = 0.0_wp
+            if (present(phi)) phi = sign(half_pi, sn0)
+            return
+        end if
+        u = du
+        if (abs(sn0) > 0.0_wp) u = u + asinh(sn0/cn0)
+        decay = exp(-abs(u))
+        sn = sign(1.0_wp, cn0)*tanh(u)
+        cn = sign(2*decay/(1 + decay*decay), cn0)
+        if (present(phi)) then
+            phi = atan2(tanh(u), abs(cn))
+            if (cn0 < 0.0_wp) phi = phi + sign(pi, sn0)
+        end if
+    end subroutine separatrix_step
+
+end module frb_agm
