@@ -9,7 +9,7 @@ module frb_chart_methods
     implicit none
     private
 
-    public :: method, catalogue, find_method, known, style, advance
+    public :: method, catalogue, find_method, known, style, advance, advance_once
     public :: family_flow, family_batch, family_momentum, family_matrix, family_paper_q, family_paper_a
     public :: family_dmv, family_rotations, family_rk4, family_dp
 
@@ -208,6 +208,17 @@ contains
         end if
         if (present(a)) a = matrix
     end subroutine advance
+
+    !> One step of an exact method, for a drift in a splitting.
+    subroutine advance_once(with, moments, h, m, q, stat)
+        type(method), intent(in) :: with
+        real(wp), intent(in) :: moments(3), h
+        real(wp), intent(inout) :: m(3), q(4)
+        integer, intent(out) :: stat
+
+        stat = status_ok
+        call advance(with, moments, h, 1, m, q)
+    end subroutine advance_once
 
     !> The methods that carry the attitude as a matrix.
     subroutine advance_matrix(with, moments, h, nsteps, m, a, stat)

@@ -7,11 +7,12 @@ program frb_charts
     use frb_chart_output, only: settings, say
     use frb_chart_precision, only: chart_work_precision, chart_growth
     use frb_chart_scale, only: chart_scale
+    use frb_chart_top, only: chart_heavy_top, chart_torus
     use frb_chart_triangle, only: chart_triangle
     use, intrinsic :: iso_fortran_env, only: error_unit
     implicit none
-    character(*), parameter :: names(*) = [character(16) :: 'speed', 'cost', 'work-precision', 'failure', 'growth', &
-        'triangle', 'scale', 'orbits']
+    character(*), parameter :: names(*) = [character(16) :: 'speed', 'cost', 'work-precision', 'heavy-top', 'failure', &
+        'growth', 'triangle', 'scale', 'orbits']
     type(settings) :: options
     character(:), allocatable :: argument
     logical :: wanted(size(names))
@@ -60,6 +61,8 @@ program frb_charts
             call chart_cost(options)
         case ('work-precision')
             call chart_work_precision(options)
+        case ('heavy-top')
+            call chart_heavy_top(options)
         case ('failure')
             call chart_failure(options)
         case ('growth')
@@ -71,6 +74,7 @@ program frb_charts
         case ('orbits')
             call chart_orbits(options)
             call chart_racket(options)
+            call chart_torus(options)
         end select
     end do
 
@@ -93,11 +97,12 @@ contains
         call say('  speed           table: the free flow against discrete Moser-Veselov, ratios of time')
         call say('  cost            time per step against step size, all methods')
         call say('  work-precision  error at t = 10 against time spent, three bodies')
+        call say('  heavy-top       the same with torque: schemes and drifts on three tops')
         call say('  failure         error against closeness to every place where methods fail')
         call say('  growth          error against the number of steps for the same time')
         call say('  triangle        error of one step h = 1 over all shapes of a body')
         call say('  scale           time per body against the number of bodies')
-        call say('  orbits          polhodes, the tennis racket')
+        call say('  orbits          polhodes, the tennis racket, the torus of a heavy top')
         call say('--quick: a minute for all of them; --out DIR: where the tables, scripts and pictures go (charts)')
     end subroutine list_charts
 
