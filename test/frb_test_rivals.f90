@@ -44,7 +44,8 @@ contains
              0.7795549814818710861007417738_rk], &
             [-0.7360613641607939361612411474_rk, -0.5707869512403507332546212462_rk, &
              -0.2993885718307900937437669433_rk, -0.2068390861046731924831171081_rk])
-        call end_values(t, 'truth-has-28-digits-on-the-flat-body', [0.345_rk, 0.653_rk, 1.0_rk], m0, 10.0_rk, &
+        call end_values(t, 'truth-has-28-digits-on-the-flat-body', [0.345_rk, 0.653_rk, 1.0_rk], m0, &
+            10.0_rk, &
             [1.805748694153316944124664435_rk, -0.2931590700520223516263628767_rk, &
              0.9291552148106494226863761060_rk], &
             [-0.5909531300598776824030520653_rk, 0.7497771466036242986823664977_rk, &
@@ -67,8 +68,10 @@ contains
         q_long = q
         call taylor_flow(moments, -301.5_rk, m, q)
         call long_truth(moments, -301.5_rk, m_long, q_long)
-        call t%at_most('skipping-periods-leaves-momentum-unchanged', real(norm2(m - m_long), wp), tolerance_truth)
-        call t%at_most('skipping-periods-leaves-attitude-unchanged', real(apart(q, q_long), wp), tolerance_truth)
+        call t%at_most('skipping-periods-leaves-momentum-unchanged', real(norm2(m - m_long), wp), &
+            tolerance_truth)
+        call t%at_most('skipping-periods-leaves-attitude-unchanged', real(apart(q, q_long), wp), &
+            tolerance_truth)
     end subroutine check_truth
 
     subroutine end_values(t, name, body, start, time, m_end, q_end)
@@ -98,7 +101,8 @@ contains
         call t%at_most('top-conserves-momentum-along-the-force', &
                        real(abs(dot_product(u, m) - dot_product(u0, m0)), wp), tolerance_truth)
         call taylor_top(moments, u0, -10.0_rk, m, q)
-        call t%at_most('top-run-back-returns-to-its-start', real(max(norm2(m - m0), apart(q, identity)), wp), &
+        call t%at_most('top-run-back-returns-to-its-start', real(max(norm2(m - m0), apart(q, identity)), &
+            wp), &
                        10*tolerance_truth)
         m = m0
         q = identity
@@ -120,9 +124,12 @@ contains
         real(rk), intent(in) :: q(4), v(3)
         real(rk) :: u(3)
 
-        u(1) = (1 - 2*(q(3)**2 + q(4)**2))*v(1) + 2*(q(2)*q(3) + q(1)*q(4))*v(2) + 2*(q(2)*q(4) - q(1)*q(3))*v(3)
-        u(2) = 2*(q(2)*q(3) - q(1)*q(4))*v(1) + (1 - 2*(q(2)**2 + q(4)**2))*v(2) + 2*(q(3)*q(4) + q(1)*q(2))*v(3)
-        u(3) = 2*(q(2)*q(4) + q(1)*q(3))*v(1) + 2*(q(3)*q(4) - q(1)*q(2))*v(2) + (1 - 2*(q(2)**2 + q(3)**2))*v(3)
+        u(1) = (1 - 2*(q(3)**2 + q(4)**2))*v(1) &
+            + 2*(q(2)*q(3) + q(1)*q(4))*v(2) + 2*(q(2)*q(4) - q(1)*q(3))*v(3)
+        u(2) = 2*(q(2)*q(3) - q(1)*q(4))*v(1) + (1 - 2*(q(2)**2 + q(4)**2))*v(2) &
+            + 2*(q(3)*q(4) + q(1)*q(2))*v(3)
+        u(3) = 2*(q(2)*q(4) + q(1)*q(3))*v(1) &
+            + 2*(q(3)*q(4) - q(1)*q(2))*v(2) + (1 - 2*(q(2)**2 + q(3)**2))*v(3)
     end function into_body
 
     !> Errors at t = 1 with n and 2 n steps.
@@ -135,8 +142,10 @@ contains
         do order = 2, 10, 2
             write (digits, '(i0)') order
             call observed('dmv', order, order_m, order_q)
-            call t%close_to('dmv-has-order-'//trim(digits)//'-in-momentum', order_m, real(order, wp), tolerance_order)
-            call t%close_to('dmv-has-order-'//trim(digits)//'-in-attitude', order_q, real(order, wp), tolerance_order)
+            call t%close_to('dmv-has-order-'//trim(digits)//'-in-momentum', order_m, real(order, wp), &
+                tolerance_order)
+            call t%close_to('dmv-has-order-'//trim(digits)//'-in-attitude', order_q, real(order, wp), &
+                tolerance_order)
         end do
         call observed('rot', 2, order_m, order_q)
         call t%close_to('three-rotations-have-order-2', min(order_m, order_q), 2.0_wp, tolerance_order)

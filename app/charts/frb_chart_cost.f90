@@ -41,7 +41,8 @@ contains
         end do
 
         call open_table(options, 'cost', 'time per step against step size; a block per method', &
-                        'h*omega, ns per step: median, quartiles, relative to the cheapest dmv: median, quartiles', unit)
+                        'h*omega, ns per step: median, quartiles, relative to the cheapest dmv: '// &
+                        'median, quartiles', unit)
         do i = 1, size(methods)
             write (unit, '(a)') '# method: '//trim(methods(i)%key)
             do k = 1, size(steps)
@@ -63,7 +64,8 @@ contains
 
         cheapest = minval(ns, dim=1, mask=spread(methods%family == family_dmv, 2, size(ns, 2)))
         do i = 1, size(methods)
-            rows(2:4, i) = [quantile(ns(i, :), 0.5_wp), quantile(ns(i, :), 0.25_wp), quantile(ns(i, :), 0.75_wp)]
+            rows(2:4, i) = [quantile(ns(i, :), 0.5_wp), quantile(ns(i, :), 0.25_wp), quantile(ns(i, :), &
+                0.75_wp)]
             rows(5:7, i) = [quantile(ns(i, :)/cheapest, 0.5_wp), quantile(ns(i, :)/cheapest, 0.25_wp), &
                             quantile(ns(i, :)/cheapest, 0.75_wp)]
         end do
@@ -83,7 +85,8 @@ contains
             'set xlabel "step size h {/Symbol w}  [rad]"', &
             'set ylabel "time per step / cheapest discrete Moser-Veselov"', &
             'set key outside right center vertical spacing 1.15 samplen 2.2 Left reverse', &
-            'set title "Cost of one step, whatever its accuracy; beyond 1 rad Moser-Veselov does not converge"', &
+            'set title "Cost of one step, whatever its accuracy; beyond 1 rad Moser-Veselov does not '// &
+            'converge"', &
             'set arrow 1 from graph 0, first 1 to graph 1, first 1 nohead lc rgb "#666666" dt 3', &
             'plot \'
         first = .true.
@@ -92,7 +95,8 @@ contains
                 if (methods(i)%key /= shown(j)) cycle
                 if (.not. first) write (unit, '(a)') ', \'
                 first = .false.
-                write (unit, '(a,i0,a)', advance='no') '  "cost.dat" index ', i - 1, ' using 1:5'//style(methods(i))
+                write (unit, '(a,i0,a)', advance='no') '  "cost.dat" index ', i - 1, ' using 1:5'// &
+                    style(methods(i))
             end do
         end do
         write (unit, '(a)') ''
@@ -103,10 +107,12 @@ contains
     !> The table of ratios that the speed of the free flow is judged by.
     subroutine chart_speed(options)
         type(settings), intent(in) :: options
-        character(*), parameter :: names(*) = [character(12) :: 'dmv2', 'dmv4', 'dmv6', 'dmv8', 'dmv10', 'flow', &
+        character(*), parameter :: names(*) = [character(12) :: 'dmv2', 'dmv4', 'dmv6', 'dmv8', 'dmv10', &
+            'flow', &
             'flow-m', 'flow-batch', 'flow-batch', 'flow-m', 'dmv2', 'dmv10', 'flow']
         integer, parameter :: bodies(*) = [1, 1, 1, 1, 1, 1, 1, 1000, 1000000, 1000, 1000, 1000, 1000]
-        real(wp), parameter :: steps(*) = [0.001_wp, 0.003_wp, 0.01_wp, 0.03_wp, 0.1_wp, 0.3_wp, 1.0_wp, 3.0_wp, 10.0_wp]
+        real(wp), parameter :: steps(*) = [0.001_wp, 0.003_wp, 0.01_wp, 0.03_wp, 0.1_wp, 0.3_wp, 1.0_wp, &
+            3.0_wp, 10.0_wp]
         type(workload), allocatable :: works(:)
         real(wp), allocatable :: ns(:, :)
         character(200) :: line
@@ -119,7 +125,8 @@ contains
         do i = 1, size(names)
             works(i) = new_workload(find_method(trim(names(i))), moments, start, 1.0_wp, bodies(i))
         end do
-        call open_table(options, 'speed', 'ratios of times per body and step: the median over the repetitions', &
+        call open_table(options, 'speed', &
+            'ratios of times per body and step: the median over the repetitions', &
             'h*omega, dmv2 [ns], dmv10 [ns], free flow [ns], flow/dmv10, flow/dmv2, momentum only/dmv10, '// &
             'batch of 1000/cheapest dmv, batch of 1e6/cheapest dmv, batch of 1000/dmv2 over 1000 bodies, '// &
             'scalar flow over 1000 bodies/dmv10 over 1000 bodies', unit)
@@ -129,9 +136,11 @@ contains
             works%h = steps(k)
             works%nsteps = 1
             call time_in_turn(options, 'speed', works, 2.0e-3_wp, .false., ns)
-            associate (dmv2 => ns(1, :), dmv10 => ns(5, :), flow => ns(6, :), cheapest => minval(ns(1:5, :), dim=1))
+            associate (dmv2 => ns(1, :), dmv10 => ns(5, :), flow => ns(6, :), cheapest => minval(ns(1:5, &
+                :), dim=1))
                 write (line, '(es9.1,3f7.1,7f10.3)') steps(k), middle(dmv2), middle(dmv10), middle(flow), &
-                    middle(flow/dmv10), middle(flow/dmv2), middle(ns(7, :)/dmv10), middle(ns(8, :)/cheapest), &
+                    middle(flow/dmv10), middle(flow/dmv2), middle(ns(7, :)/dmv10), middle(ns(8, &
+                    :)/cheapest), &
                     middle(ns(9, :)/cheapest), middle(ns(8, :)/ns(11, :)), middle(ns(13, :)/ns(12, :))
             end associate
             write (unit, '(a)') trim(line)

@@ -52,14 +52,17 @@ contains
                 end do
                 call progress(options, 'failure', (p - 1)*points + k, panels*points)
             end do
-            call open_table(options, 'failure-'//trim(names(p)), 'error in units of the inherent sensitivity '// &
-                'against '//trim(titles(p))//'; a block per method', 'distance (0 drawn at 1e-17), median score, '// &
+            call open_table(options, 'failure-'//trim(names(p)), &
+                'error in units of the inherent sensitivity '// &
+                'against '//trim(titles(p))//'; a block per method', &
+                'distance (0 drawn at 1e-17), median score, '// &
                 'largest score; 1e18: NaN or refused; approximate methods take steps of 0.02 rad', unit)
             do i = 1, size(methods)
                 write (unit, '(a)') '# method: '//trim(methods(i)%key)
                 do k = 1, points
                     if (scores(2, i, k) < 0.0_wp) cycle
-                    write (unit, '(3es12.3)') merge(1.0e-17_wp, distance(k), distance(k) <= 0.0_wp), scores(:, i, k)
+                    write (unit, '(3es12.3)') merge(1.0e-17_wp, distance(k), distance(k) <= 0.0_wp), &
+                        scores(:, i, k)
                 end do
                 write (unit, '(/)')
             end do
@@ -92,7 +95,8 @@ contains
         allocate (keep(size(methods)))
         do i = 1, size(methods)
             keep(i) = methods(i)%family /= family_momentum
-            if (methods(i)%family == family_dp) keep(i) = methods(i)%key == 'dp-15' .or. methods(i)%key == 'dp-9'
+            if (methods(i)%family == family_dp) keep(i) = methods(i)%key == 'dp-15' &
+                .or. methods(i)%key == 'dp-9'
         end do
         allocate (kept, source=pack(methods, keep))
     end function chosen
@@ -155,7 +159,8 @@ contains
         case (8)
             m = [0.0_wp, distance*sign_of, -1.0_wp]
         end select
-        item = new_case(moments, m, merge(distance*(0.5_wp + x(4)), (2 + 8*x(4))/norm2(m/moments), panel == 9))
+        item = new_case(moments, m, merge(distance*(0.5_wp + x(4)), (2 + 8*x(4))/norm2(m/moments), &
+            panel == 9))
     end function new_failure_case
 
     !> Median and largest score of a method over the cases: the larger of those of momentum and attitude.
@@ -170,7 +175,8 @@ contains
         do c = 1, size(cases)
             angle = abs(cases(c)%t)*norm2(cases(c)%m0/cases(c)%moments)
             nsteps = 1
-            if (.not. with%exact .and. with%family /= family_dp) nsteps = max(1, ceiling(min(angle/small_step, 1.0e9_wp)))
+            if (.not. with%exact .and. with%family /= family_dp) nsteps = max(1, &
+                ceiling(min(angle/small_step, 1.0e9_wp)))
             if (nsteps > most_steps .or. (with%family == family_dp .and. angle > most_steps*small_step)) then
                 scores = -1.0_wp
                 return
@@ -187,8 +193,10 @@ contains
     subroutine draw_failure(options, methods)
         type(settings), intent(in) :: options
         type(method), intent(in) :: methods(:)
-        character(*), parameter :: shown(*) = [character(12) :: 'rk4', 'rotations4', 'dmv2', 'dmv10', 'dp-15', &
-            'quat_step-2', 'frb_step-10', 'quat_step-f3', 'quat_step-f2', 'quat_step', 'frb_step', 'flow-batch', 'flow']
+        character(*), parameter :: shown(*) = [character(12) :: 'rk4', 'rotations4', 'dmv2', 'dmv10', &
+            'dp-15', &
+            'quat_step-2', 'frb_step-10', 'quat_step-f3', 'quat_step-f2', 'quat_step', 'frb_step', &
+            'flow-batch', 'flow']
         integer :: unit, p, i, j, entries
 
         call open_script(options, 'failure', 1000, 1060, unit)
@@ -198,14 +206,18 @@ contains
             'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0', 'set size 0.25,0.195'
         do p = 1, panels
             if (p == 9) then
-                write (unit, '(a)') 'set xrange [3e-9:3e8]', 'set xtics ("10^{-8}" 1e-8, "10^{-4}" 1e-4, "1" 1, '// &
+                write (unit, '(a)') 'set xrange [3e-9:3e8]', &
+                    'set xtics ("10^{-8}" 1e-8, "10^{-4}" 1e-4, "1" 1, '// &
                     '"10^4" 1e4, "10^8" 1e8)'
             else
                 write (unit, '(a)') 'set xrange [0.3:3e-18]', &
-                    'set xtics ("0" 1e-17, "10^{-15}" 1e-15, "10^{-10}" 1e-10, "10^{-5}" 1e-5, "10^{-1}" 1e-1)'
+                    'set xtics ("0" 1e-17, "10^{-15}" 1e-15, "10^{-10}" 1e-10, "10^{-5}" 1e-5, '// &
+                    '"10^{-1}" 1e-1)'
             end if
-            write (unit, '(a,f6.4,a,f6.4)') 'set origin ', 0.075 + 0.315*mod(p - 1, 3), ',', 0.77 - 0.265*((p - 1)/3)
-            write (unit, '(a)') either(mod(p, 3) == 1, 'set ylabel "error  [units]" offset 1.2,0', 'unset ylabel')
+            write (unit, '(a,f6.4,a,f6.4)') 'set origin ', 0.075 + 0.315*mod(p - 1, 3), ',', &
+                0.77 - 0.265*((p - 1)/3)
+            write (unit, '(a)') either(mod(p, 3) == 1, 'set ylabel "error  [units]" offset 1.2,0', &
+                'unset ylabel')
             write (unit, '(a)') 'set title "'//trim(titles(p))//'" offset 0,-0.7', 'plot \', &
                 '  4 with filledcurves y1=1e-3 lc rgb "#eeeeee" notitle, \'
             do j = 1, size(shown)
@@ -217,7 +229,8 @@ contains
             write (unit, '(a)') '  NaN notitle'
         end do
         write (unit, '(a)') 'set origin 0.03,0.005', 'set size 0.94,0.17', 'unset border', 'unset tics', &
-            'unset ylabel', 'unset title', 'unset grid', 'unset logscale', 'set xrange [0:1]', 'set yrange [0:1]', &
+            'unset ylabel', 'unset title', 'unset grid', 'unset logscale', 'set xrange [0:1]', &
+            'set yrange [0:1]', &
             'set key center center maxrows 4 samplen 2.2 spacing 1.2 Left reverse', &
             'plot NaN with boxes fs solid noborder lc rgb "#eeeeee" title "up to 4 units", \'
         entries = 0

@@ -46,7 +46,8 @@ contains
         character(4) :: digits
         integer :: i
 
-        ! Colours: the free flow vermilion, the paper's exact steps green, its semi-exact ones purple, discrete
+        ! Colours: the free flow vermilion, the paper's exact steps green, its semi-exact ones purple,
+        ! discrete
         ! Moser-Veselov blue, rotations orange, Runge-Kutta black and grey; dash and symbol tell the rest.
         allocate (methods(0))
         call add('flow', 'free flow', family_flow, 0, 0, 2, 1, 7, 4)
@@ -55,7 +56,8 @@ contains
         call add('flow-a', 'free flow, matrix', family_matrix, 0, 0, 2, 4, 11, 2)
         do i = 2, 10, 2
             write (digits, '(i0)') i
-            call add('dmv'//digits, 'Moser-Veselov '//digits, family_dmv, i, 0, merge(3, 7, i == 2 .or. i == 10), &
+            call add('dmv'//digits, 'Moser-Veselov '//digits, family_dmv, i, 0, merge(3, 7, i == 2 &
+                .or. i == 10), &
                      merge(1, 2, i > 4), i/2 + 7, 2)
         end do
         call add('rotations2', '3 rotations, order 2', family_rotations, 2, 0, 6, 1, 4, 2)
@@ -63,7 +65,8 @@ contains
         call add('rk4', 'Runge-Kutta 4', family_rk4, 0, 0, 1, 2, 2, 2)
         do i = 3, 15, 3
             write (digits, '(i0)') i
-            call add('dp-'//digits, 'DoPri 8(5,3) 1e-'//digits, family_dp, 0, 0, 8, 1 + i/6, 1, 2, 10.0_wp**(-i))
+            call add('dp-'//digits, 'DoPri 8(5,3) 1e-'//digits, family_dp, 0, 0, 8, 1 + i/6, 1, 2, &
+                10.0_wp**(-i))
         end do
 
     contains
@@ -125,11 +128,13 @@ contains
     !> The end of a gnuplot plot clause: line, symbol and title of a method's curve.
     function style(with, label) result(clause)
         type(method), intent(in) :: with
-        character(*), intent(in), optional :: label     !! instead of the method's own; '' for no entry in the key
+        character(*), intent(in), &
+            optional :: label     !! instead of the method's own; '' for no entry in the key
         character(:), allocatable :: clause
         character(80) :: text
 
-        write (text, '(4(a,i0),a)') ' with linespoints lt ', with%colour, ' dt ', with%dash, ' pt ', with%symbol, &
+        write (text, '(4(a,i0),a)') ' with linespoints lt ', with%colour, ' dt ', with%dash, ' pt ', &
+            with%symbol, &
             ' lw ', with%width, ' ps 0.7'
         if (present(label)) then
             clause = trim(text)//' title "'//label//'"'

@@ -1,4 +1,5 @@
-!> Pictures of the motion itself: `orbits` (the polhodes on the sphere of the momentum) and `racket` (the flips of a
+!> Pictures of the motion itself: `orbits` (the polhodes on the sphere of the momentum) and `racket` (the
+!> flips of a
 !> tennis racket, with the errors of energy and momentum below).
 module frb_chart_orbits
     use frb, only: wp, rigid_body, free_flow, quat_rotate
@@ -16,7 +17,8 @@ contains
     subroutine chart_orbits(options)
         type(settings), intent(in) :: options
         real(wp), parameter :: moments(3) = [1.0_wp, 2.0_wp, 3.0_wp]
-        real(wp), parameter :: angles(*) = [6.0_wp, 14.0_wp, 22.0_wp, 27.0_wp, 33.0_wp, 40.0_wp, 50.0_wp, 63.0_wp, &
+        real(wp), parameter :: angles(*) = [6.0_wp, 14.0_wp, 22.0_wp, 27.0_wp, 33.0_wp, 40.0_wp, 50.0_wp, &
+            63.0_wp, &
             67.0_wp, 72.0_wp, 77.0_wp, 83.0_wp]
         integer, parameter :: points = 120
         type(rigid_body) :: body
@@ -25,8 +27,10 @@ contains
         integer :: i, side, k, unit
 
         body = rigid_body(moments)
-        call open_table(options, 'orbits', 'polhodes of I = (1, 2, 3), |m| = 1, seen from (3, 2, 2) without '// &
-            'perspective; a block per orbit, the four arcs of the separatrix first', 'right, up, 1 if in front', unit)
+        call open_table(options, 'orbits', &
+            'polhodes of I = (1, 2, 3), |m| = 1, seen from (3, 2, 2) without '// &
+            'perspective; a block per orbit, the four arcs of the separatrix first', &
+            'right, up, 1 if in front', unit)
         ! (a1 - a2) m1^2 = (a2 - a3) m3^2 on the separatrix: each arc from the middle axis to its opposite.
         do i = 0, 3
             start = [merge(1, -1, i < 2)*0.5_wp, 0.0_wp, merge(1, -1, mod(i, 2) == 0)*sqrt(0.75_wp)]
@@ -58,7 +62,8 @@ contains
         call open_script(options, 'orbits', 640, 620, unit)
         write (unit, '(a)') 'unset border', 'unset tics', 'unset grid', 'set size ratio -1', 'unset key', &
             'set xrange [-1.3:1.3]', 'set yrange [-1.25:1.3]', &
-            'set object 1 circle at 0,0 size first 1 fillstyle solid border lc rgb "#888888" fc rgb "#f4f4f4" behind', &
+            'set object 1 circle at 0,0 size first 1 fillstyle solid border lc rgb "#888888" fc rgb '// &
+            '"#f4f4f4" behind', &
             'set title "Momentum of a free body, I = (1, 2, 3): every orbit is one formula"'
         call label_axis(unit, [1.0_wp, 0.0_wp, 0.0_wp], 'axis 1')
         call label_axis(unit, [0.0_wp, 1.0_wp, 0.0_wp], 'axis 2 (unstable)')
@@ -88,7 +93,8 @@ contains
         real(wp) :: seen(3)
         real(wp), parameter :: eye(3) = [3.0_wp, 2.0_wp, 2.0_wp]/sqrt(17.0_wp)
         real(wp), parameter :: right(3) = [-2.0_wp, 3.0_wp, 0.0_wp]/sqrt(13.0_wp)
-        real(wp), parameter :: up(3) = [eye(2)*right(3) - eye(3)*right(2), eye(3)*right(1) - eye(1)*right(3), &
+        real(wp), parameter :: up(3) = [eye(2)*right(3) - eye(3)*right(2), &
+            eye(3)*right(1) - eye(1)*right(3), &
                                         eye(1)*right(2) - eye(2)*right(1)]
 
         seen = [dot_product(right, m), dot_product(up, m), dot_product(eye, m)]
@@ -120,8 +126,10 @@ contains
         real(wp) :: m(3), q(4), energy0, energy, space(3)
         integer :: i, k, unit
 
-        call open_table(options, 'racket', 'tennis racket, I = (3, 5, 9), m = (0, 2, 0.01) at the start, steps of 0.1; '// &
-            'a block per method', 't, omega1, omega2, omega3, relative error of the energy, error of the momentum '// &
+        call open_table(options, 'racket', &
+            'tennis racket, I = (3, 5, 9), m = (0, 2, 0.01) at the start, steps of 0.1; '// &
+            'a block per method', &
+            't, omega1, omega2, omega3, relative error of the energy, error of the momentum '// &
             'in space over its norm', unit)
         energy0 = sum(m0**2/moments)/2
         do i = 1, size(keys)
@@ -140,20 +148,24 @@ contains
         end do
         close (unit)
         call open_script(options, 'racket', 900, 640, unit)
-        write (unit, '(a)') 'set multiplot', 'set xrange [0:100]', 'set lmargin at screen 0.1', 'set rmargin at screen 0.97', &
+        write (unit, '(a)') 'set multiplot', 'set xrange [0:100]', 'set lmargin at screen 0.1', &
+            'set rmargin at screen 0.97', &
             'set bmargin at screen 0.56', 'set tmargin at screen 0.92', &
             'set title "Tennis racket spun about its middle axis: a flip every half period" offset 0,-0.5', &
-            'set ylabel "{/Symbol w}  [rad per unit of time]"', 'set yrange [-0.52:0.62]', 'set format x ""', &
+            'set ylabel "{/Symbol w}  [rad per unit of time]"', 'set yrange [-0.52:0.62]', &
+            'set format x ""', &
             'set key top center horizontal samplen 2.2', 'plot \', &
             '  "racket.dat" index 0 using 1:2 with lines lt 3 lw 2 title "{/Symbol w}_1", \', &
             '  "" index 0 using 1:3 with lines lt 2 lw 3 title "{/Symbol w}_2", \', &
             '  "" index 0 using 1:4 with lines lt 4 lw 2 title "{/Symbol w}_3"', &
             'unset title', 'set bmargin at screen 0.11', 'set tmargin at screen 0.53', 'set logscale y', &
             'set format x "%g"', 'set format y "10^{%T}"', 'set yrange [5e-18:1e1]', 'set xlabel "time"', &
-            'set ytics 1e-16,1e4', 'set ylabel "relative error of energy"', 'set key top center horizontal', 'plot \'
+            'set ytics 1e-16,1e4', 'set ylabel "relative error of energy"', &
+            'set key top center horizontal', 'plot \'
         do i = 1, size(keys)
             with = find_method(trim(keys(i)))
-            write (unit, '(a,i0,a,i0,a,i0,a,i0,a)') '  "racket.dat" index ', i - 1, ' using 1:5 every 5 with points lt ', &
+            write (unit, '(a,i0,a,i0,a,i0,a,i0,a)') '  "racket.dat" index ', i - 1, &
+                ' using 1:5 every 5 with points lt ', &
                 with%colour, ' pt ', points(i), ' ps ', 1, '*0.5 title "'//trim(with%label)// &
                 '"'//either(i == size(keys), '', ', \')
         end do

@@ -7,7 +7,8 @@ module frb_chart_output
     implicit none
     private
 
-    public :: settings, open_table, open_script, draw, progress, say, either, sorted, quantile, uniform, random_direction
+    public :: settings, open_table, open_script, draw, progress, say, either, sorted, quantile, uniform, &
+        random_direction
 
     !> What the command line asks for.
     type :: settings
@@ -51,7 +52,8 @@ contains
         write (unit, '(a)') '# drawn by: gnuplot '//name//'.gp, in the folder of the tables'
         write (unit, '(a,i0,a,i0,a)') 'if (!exists("format")) set terminal svg size ', width, ',', height, &
             ' font "Helvetica,15" background "#ffffff"; set output "'//name//'.svg"'
-        write (unit, '(a,i0,a,i0,a)') 'if (exists("format")) set terminal pngcairo size ', width, ',', height, &
+        write (unit, '(a,i0,a,i0,a)') 'if (exists("format")) set terminal pngcairo size ', width, ',', &
+            height, &
             ' font "Helvetica,12"; set output "'//name//'.png"'
         do i = 1, size(palette)
             write (unit, '(a,i0,a)') 'set linetype ', i, ' lc rgb '//trim(palette(i))//' lw 2 pt 7 ps 0.5'
@@ -72,7 +74,8 @@ contains
         if (command_code == 0 .and. code == 0) then
             call say('  '//options%folder//'/'//name//'.svg')
         else
-            call say('  no picture: gnuplot is missing or failed; the table and the script '//options%folder// &
+            call say('  no picture: gnuplot is missing or failed; the table and the script '// &
+                options%folder// &
                      '/'//name//'.gp are kept, "gnuplot '//name//'.gp" in that folder draws it')
         end if
     end subroutine draw
@@ -106,7 +109,8 @@ contains
 
         if (.not. options%terminal) return
         write (error_unit, '(a,i4,a)', advance='no') achar(13)//what//':', (100*done)/max(of, 1), ' %   '
-        if (done >= of) write (error_unit, '(a)', advance='no') achar(13)//repeat(' ', len(what) + 12)//achar(13)
+        if (done >= of) write (error_unit, '(a)', advance='no') achar(13)//repeat(' ', len(what) + 12)// &
+            achar(13)
         flush (error_unit)
     end subroutine progress
 

@@ -43,7 +43,8 @@ contains
         do b = 1, 3
             call measure(options, methods, new_case(bodies(:, b), m0, 10.0_wp), points, counts)
             call open_table(options, 'work-precision-'//trim(names(b)), &
-                'errors at t = 10 against the time to get there, from m = (1.8, 0.4, -0.9); a block per method, '// &
+                'errors at t = 10 against the time to get there, from m = (1.8, 0.4, -0.9); a block '// &
+                'per method, '// &
                 'last the envelope', 'number of steps or tolerance; time [ns]: median, quartiles; '// &
                 'error of attitude [rad]; error of momentum', unit)
             write (unit, '(a,3f8.4)') '# moments:', bodies(:, b)
@@ -114,7 +115,8 @@ contains
             end do
         end do
         allocate (ns(total, merge(5, 9, options%quick)))
-        call time_in_turn(options, 'work-precision', works(:total), merge(0.5e-3_wp, 2.0e-3_wp, options%quick), &
+        call time_in_turn(options, 'work-precision', works(:total), merge(0.5e-3_wp, 2.0e-3_wp, &
+            options%quick), &
                           .true., ns)
         total = 0
         do i = 1, size(methods)
@@ -151,7 +153,8 @@ contains
             place = 0
             do i = 1, size(methods)
                 do k = 1, counts(i)
-                    if (points(k, i)%ns(1) < time .and. max(floor_of_errors, points(k, i)%error_q) < best_error &
+                    if (points(k, i)%ns(1) < time .and. max(floor_of_errors, points(k, &
+                        i)%error_q) < best_error &
                         .and. points(k, i)%ns(1) >= last_time) then
                         time = points(k, i)%ns(1)
                         place = [k, i]
@@ -176,12 +179,15 @@ contains
         integer :: unit, b, i
 
         call open_script(options, 'work-precision', 1000, 940, unit)
-        write (unit, '(a)') 'set multiplot', 'set logscale xy', 'set format x "10^{%T}"', 'set format y "10^{%T}"', &
+        write (unit, '(a)') 'set multiplot', 'set logscale xy', 'set format x "10^{%T}"', &
+            'set format y "10^{%T}"', &
             'set yrange [1e-16:30]', 'set xrange [50:5e6]', 'set ytics 1e-16,1e2', &
-            'set xlabel "time spent to reach t = 10  [ns]" offset 0,0.4', 'set ylabel "error of attitude  [rad]"', &
+            'set xlabel "time spent to reach t = 10  [ns]" offset 0,0.4', &
+            'set ylabel "error of attitude  [rad]"', &
             'unset key', 'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0'
         do b = 1, size(names)
-            write (title, '(a,2(f5.3,a),f5.3,a)') ': I = (', bodies(1, b), ', ', bodies(2, b), ', ', bodies(3, b), ')'
+            write (title, '(a,2(f5.3,a),f5.3,a)') ': I = (', bodies(1, b), ', ', bodies(2, b), ', ', &
+                bodies(3, b), ')'
             write (unit, '(a)') 'set title "'//trim(names(b))//' body'//trim(title)//'" offset 0,-0.6'
             write (unit, '(a,f5.3,a,f5.3)') 'set origin ', merge(0.08, 0.58, mod(b, 2) == 1), ',', &
                 merge(0.56, 0.07, b < 3)
@@ -193,8 +199,10 @@ contains
                     ' using 2:5'//style(methods(i), '')//either(i == 1, '', ', \')
             end do
         end do
-        write (unit, '(a)') 'set origin 0.53,0.05', 'set size 0.47,0.45', 'unset border', 'unset tics', 'unset xlabel', &
-            'unset ylabel', 'unset title', 'unset grid', 'unset logscale', 'set xrange [0:1]', 'set yrange [0:1]', &
+        write (unit, '(a)') 'set origin 0.53,0.05', 'set size 0.47,0.45', 'unset border', 'unset tics', &
+            'unset xlabel', &
+            'unset ylabel', 'unset title', 'unset grid', 'unset logscale', 'set xrange [0:1]', &
+            'set yrange [0:1]', &
             'set key center center maxrows 12 samplen 2.2 spacing 1.1 Left reverse', 'plot \', &
             '  NaN with lines lc rgb "#dddddd" lw 10 title "lower left envelope", \'
         do i = 1, size(methods)
@@ -230,8 +238,10 @@ contains
             cases(b) = new_case(moments, m0*0.5_wp, duration)
         end do
         most = merge(6, 12, options%quick)
-        call open_table(options, 'growth', 'errors at t = 16 against the number of steps, |m| = 1/2, median and '// &
-            'largest over 9 bodies (5 with --quick); a block per method', 'steps, error of attitude [rad]: median, '// &
+        call open_table(options, 'growth', &
+            'errors at t = 16 against the number of steps, |m| = 1/2, median and '// &
+            'largest over 9 bodies (5 with --quick); a block per method', &
+            'steps, error of attitude [rad]: median, '// &
             'largest; error of momentum: median, largest', unit)
         do i = 1, size(methods)
             if (methods(i)%family == family_dp) cycle
@@ -242,7 +252,8 @@ contains
                     call errors_of(methods(i), cases(b), n, errors(1, b), errors(2, b))
                 end do
                 write (unit, '(i8,4es12.3)') n, max(floor_of_errors, quantile(errors(2, :), 0.5_wp)), &
-                    max(floor_of_errors, maxval(errors(2, :))), max(floor_of_errors, quantile(errors(1, :), 0.5_wp)), &
+                    max(floor_of_errors, maxval(errors(2, :))), max(floor_of_errors, quantile(errors(1, :), &
+                    0.5_wp)), &
                     max(floor_of_errors, maxval(errors(1, :)))
                 call progress(options, 'growth', (i - 1)*(most + 1) + k + 1, size(methods)*(most + 1))
             end do

@@ -56,7 +56,8 @@ contains
                 call progress(options, 'scale', (k - 1)*repetitions + r, counts*repetitions)
             end do
         end do
-        call open_table(options, 'scale', 'time per body and step against the number of bodies, h = 0.1; a block '// &
+        call open_table(options, 'scale', &
+            'time per body and step against the number of bodies, h = 0.1; a block '// &
             'per method', 'bodies, ns per body and step: median, quartiles', unit)
         do i = 1, curves
             write (unit, '(a,i0,a)') '# method: '//trim(keys(i))//', ', threads(i), ' thread(s)'
@@ -65,7 +66,8 @@ contains
                     if (k == 1) write (unit, '(a)') 'NaN NaN NaN NaN'
                     cycle
                 end if
-                write (unit, '(i9,3f10.2)') 10**(k - 1), quantile(ns(:, i, k), 0.5_wp), quantile(ns(:, i, k), 0.25_wp), &
+                write (unit, '(i9,3f10.2)') 10**(k - 1), quantile(ns(:, i, k), 0.5_wp), quantile(ns(:, i, &
+                    k), 0.25_wp), &
                     quantile(ns(:, i, k), 0.75_wp)
             end do
             write (unit, '(/)')
@@ -89,9 +91,11 @@ contains
             character(:), allocatable :: label
 
             call open_script(options, 'scale', 900, 520, unit)
-            write (unit, '(a)') 'set logscale x', 'set format x "10^{%T}"', 'set xrange [0.7:1.5e7]', 'set yrange [0:*]', &
+            write (unit, '(a)') 'set logscale x', 'set format x "10^{%T}"', 'set xrange [0.7:1.5e7]', &
+                'set yrange [0:*]', &
                 'set xlabel "number of bodies"', 'set ylabel "time per body and step  [ns]"', &
-                'set title "Many bodies, h = 0.1"', 'set key outside right center vertical samplen 2.2 Left reverse', 'plot \'
+                'set title "Many bodies, h = 0.1"', &
+                'set key outside right center vertical samplen 2.2 Left reverse', 'plot \'
             do i = 1, curves
                 if (threads(i) > 1 .and. .not. two) cycle
                 with = find_method(trim(keys(i)))
@@ -101,7 +105,8 @@ contains
                     with%symbol = 4
                     with%dash = 3
                 end if
-                write (unit, '(a,i0,a)') '  "scale.dat" index ', i - 1, ' using 1:2'//style(with, label)//', \'
+                write (unit, '(a,i0,a)') '  "scale.dat" index ', i - 1, ' using 1:2'//style(with, label)// &
+                    ', \'
             end do
             write (unit, '(a)') '  NaN notitle'
             close (unit)

@@ -1,7 +1,9 @@
-!> The charts with torque: `heavy-top` (schemes and drifts, error against time) and `torus` (the paper's figure 7
+!> The charts with torque: `heavy-top` (schemes and drifts, error against time) and `torus` (the paper's
+!> figure 7
 !> made again).
 module frb_chart_top
-    use frb, only: wp, rigid_body, splitting_scheme, heavy_top, body_drift, body_observer, integrate, status_ok
+    use frb, only: wp, rigid_body, splitting_scheme, heavy_top, body_drift, body_observer, integrate, &
+        status_ok
     use frb_chart_methods, only: method, find_method, known, advance_once, family_dmv
     use frb_chart_output, only: settings, open_table, open_script, draw, progress, either, quantile
     use frb_dmv, only: dmv_body, new_dmv_body, dmv_steps
@@ -14,8 +16,10 @@ module frb_chart_top
 
     !> The paper's heavy top, section 4.3.
     real(wp), parameter :: paper_moments(3) = [1.0_wp, 1.0126869887825154_wp, 3.3062374224730378_wp]
-    real(wp), parameter :: paper_m0(3) = [-0.34790957088547336_wp, -0.19822914599675923_wp, -0.91633189192763642_wp]
-    real(wp), parameter :: paper_u0(3) = [9.5586303547238536e-5_wp, 4.8777318247201465e-4_wp, -8.6772148817192390e-4_wp]
+    real(wp), parameter :: paper_m0(3) = [-0.34790957088547336_wp, -0.19822914599675923_wp, &
+        -0.91633189192763642_wp]
+    real(wp), parameter :: paper_u0(3) = [9.5586303547238536e-5_wp, 4.8777318247201465e-4_wp, &
+        -8.6772148817192390e-4_wp]
 
     !> A drift by any method of the catalogue; the rival's constants are set up once.
     type, extends(body_drift) :: catalogue_drift
@@ -48,10 +52,13 @@ contains
         character(*), parameter :: names(3) = [character(10) :: 'paper', 'asymmetric', 'flat']
         character(*), parameter :: titles(3) = [character(60) :: 'the paper''s top, |V| = 0.001, t = 100', &
             'Hairer-Vilmart top (0.6, 0.8, 1), t = 10', 'Hairer-Vilmart top (0.345, 0.653, 1), t = 10']
-        real(wp), parameter :: moments(3, 3) = reshape([paper_moments, 0.6_wp, 0.8_wp, 1.0_wp, 0.345_wp, 0.653_wp, &
+        real(wp), parameter :: moments(3, 3) = reshape([paper_moments, 0.6_wp, 0.8_wp, 1.0_wp, 0.345_wp, &
+            0.653_wp, &
                                                         1.0_wp], [3, 3])
-        real(wp), parameter :: m0(3, 3) = reshape([paper_m0, 1.8_wp, 0.4_wp, -0.9_wp, 1.8_wp, 0.4_wp, -0.9_wp], [3, 3])
-        real(wp), parameter :: u0(3, 3) = reshape([paper_u0, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [3, 3])
+        real(wp), parameter :: m0(3, 3) = reshape([paper_m0, 1.8_wp, 0.4_wp, -0.9_wp, 1.8_wp, 0.4_wp, &
+            -0.9_wp], [3, 3])
+        real(wp), parameter :: u0(3, 3) = reshape([paper_u0, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, &
+            1.0_wp], [3, 3])
         real(wp), parameter :: duration(3) = [100.0_wp, 10.0_wp, 10.0_wp]
         integer, parameter :: first_steps(3) = [4, 8, 8]
         type(pairing), allocatable :: pairs(:)
@@ -62,13 +69,17 @@ contains
         most = merge(6, 11, options%quick)
         allocate (errors(most, size(pairs)), ns(3, most, size(pairs)))
         do s = 1, size(names)
-            call measure(options, pairs, moments(:, s), m0(:, s), u0(:, s), duration(s), first_steps(s), errors, ns)
-            call open_table(options, 'heavy-top-'//trim(names(s)), 'error against time spent: '//trim(titles(s))// &
-                '; a block per scheme and drift', 'steps, time [ns]: median, quartiles; error of attitude [rad]', unit)
+            call measure(options, pairs, moments(:, s), m0(:, s), u0(:, s), duration(s), first_steps(s), &
+                errors, ns)
+            call open_table(options, 'heavy-top-'//trim(names(s)), 'error against time spent: '// &
+                trim(titles(s))// &
+                '; a block per scheme and drift', &
+                'steps, time [ns]: median, quartiles; error of attitude [rad]', unit)
             do i = 1, size(pairs)
                 write (unit, '(a)') '# '//trim(pairs(i)%scheme)//' with '//trim(pairs(i)%drift)
                 do k = 1, most
-                    write (unit, '(i8,3es13.4,es12.3)') steps_at(options, first_steps(s), k), ns(:, k, i), errors(k, i)
+                    write (unit, '(i8,3es13.4,es12.3)') steps_at(options, first_steps(s), k), ns(:, k, i), &
+                        errors(k, i)
                 end do
                 write (unit, '(/)')
             end do
@@ -122,11 +133,13 @@ contains
             do i = 1, size(pairs)
                 call run(pairs(i), moments, m0, u0, duration, steps_at(options, first, k), 1, m, q, seconds)
                 errors(k, i) = max(1.0e-17_wp, real(2*min(norm2(q - q_end), norm2(q + q_end)), wp))
-                rounds(i) = max(1, min(1000, int(merge(0.3e-3_wp, 1.0e-3_wp, options%quick)/max(seconds, 1.0e-7_wp))))
+                rounds(i) = max(1, min(1000, int(merge(0.3e-3_wp, 1.0e-3_wp, options%quick)/max(seconds, &
+                    1.0e-7_wp))))
             end do
             do r = 1, repetitions
                 do i = 1, size(pairs)
-                    call run(pairs(i), moments, m0, u0, duration, steps_at(options, first, k), rounds(i), m, q, seconds)
+                    call run(pairs(i), moments, m0, u0, duration, steps_at(options, first, k), rounds(i), &
+                        m, q, seconds)
                     times(r, i) = 1.0e9_wp*seconds/rounds(i)
                 end do
             end do
@@ -195,25 +208,31 @@ contains
         integer :: unit, s, i
 
         call open_script(options, 'heavy-top', 1000, 940, unit)
-        write (unit, '(a)') 'set multiplot', 'set logscale xy', 'set format x "10^{%T}"', 'set format y "10^{%T}"', &
+        write (unit, '(a)') 'set multiplot', 'set logscale xy', 'set format x "10^{%T}"', &
+            'set format y "10^{%T}"', &
             'set yrange [1e-16:30]', 'set xrange [2e2:2e7]', 'set ytics 1e-16,1e2', &
             'set xlabel "time spent  [ns]" offset 0,0.4', 'set ylabel "error of attitude  [rad]"', &
             'unset key', 'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0'
         do s = 1, size(names)
             write (unit, '(a,f5.3,a,f5.3)') 'set origin ', merge(0.08, 0.58, mod(s, 2) == 1), ',', &
                 merge(0.56, 0.07, s < 3)
-            write (unit, '(a)') 'set title "'//trim(titles(s))//'" offset 0,-0.6', 'set size 0.40,0.40', 'plot \'
+            write (unit, '(a)') 'set title "'//trim(titles(s))//'" offset 0,-0.6', 'set size 0.40,0.40', &
+                'plot \'
             do i = 1, size(pairs)
                 write (unit, '(a,i0,a)') '  "heavy-top-'//trim(names(s))//'.dat" index ', i - 1, &
                     ' using 2:5'//curve(pairs(i), 'notitle')//either(i == size(pairs), '', ', \')
             end do
         end do
-        write (unit, '(a)') 'set origin 0.53,0.05', 'set size 0.47,0.45', 'unset border', 'unset tics', 'unset xlabel', &
-            'unset ylabel', 'unset title', 'unset grid', 'unset logscale', 'set xrange [0:1]', 'set yrange [0:1]', &
+        write (unit, '(a)') 'set origin 0.53,0.05', 'set size 0.47,0.45', 'unset border', 'unset tics', &
+            'unset xlabel', &
+            'unset ylabel', 'unset title', 'unset grid', 'unset logscale', 'set xrange [0:1]', &
+            'set yrange [0:1]', &
             'set key center center maxrows 14 samplen 2.2 spacing 1.1 Left reverse', 'plot \'
         do i = 1, size(pairs)
-            clause = trim(pairs(i)%scheme)//', '//either(pairs(i)%drift == 'flow', 'free flow', escaped(pairs(i)%drift))
-            write (unit, '(a)') '  NaN'//curve(pairs(i), 'title "'//trim(clause)//'"')//either(i == size(pairs), '', ', \')
+            clause = trim(pairs(i)%scheme)//', '//either(pairs(i)%drift == 'flow', 'free flow', &
+                escaped(pairs(i)%drift))
+            write (unit, '(a)') '  NaN'//curve(pairs(i), 'title "'//trim(clause)//'"')// &
+                either(i == size(pairs), '', ', \')
         end do
         write (unit, '(a)') 'unset multiplot'
         close (unit)
@@ -227,7 +246,8 @@ contains
         character(:), allocatable :: clause
         character(80) :: text
 
-        write (text, '(4(a,i0),a)') ' with linespoints lt ', pair%colour, ' dt ', pair%dash, ' pt ', pair%symbol, &
+        write (text, '(4(a,i0),a)') ' with linespoints lt ', pair%colour, ' dt ', pair%dash, ' pt ', &
+            pair%symbol, &
             ' lw ', pair%width, ' ps 0.7'
         clause = trim(text)//' '//title
     end function curve
@@ -249,19 +269,24 @@ contains
         type(raster) :: whole, detail
         integer :: unit
 
-        call run_torus(options, [-1.02_wp, -1.02_wp], [1.02_wp, 1.02_wp], whole)
-        call run_torus(options, [0.28_wp, 0.10_wp], [0.36_wp, 0.18_wp], detail)
-        call open_table(options, 'torus', 'where the momentum of the paper''s heavy top is, h = 0.5, t up to 5e4; '// &
+        call run_torus(options, [-0.46_wp, -0.46_wp], [0.46_wp, 0.46_wp], whole)
+        call run_torus(options, [0.3972_wp, -0.06_wp], [0.4002_wp, 0.06_wp], detail)
+        call open_table(options, 'torus', &
+            'where the momentum of the paper''s heavy top is, h = 0.5, t up to 5e4; '// &
             'blocks: the whole, a close-up', 'm1, m2, number of steps in the pixel (NaN: none)', unit)
         call write_raster(whole)
         call write_raster(detail)
         close (unit)
         call open_script(options, 'torus', 1000, 520, unit)
         write (unit, '(a)') 'set multiplot layout 1,2', 'set size ratio -1', 'unset key', 'unset colorbox', &
-            'set xlabel "m_1"', 'set ylabel "m_2"', 'set logscale cb', &
+            'set xlabel "m_1"', 'set ylabel "m_2"', 'set logscale cb', 'set xrange [-0.46:0.46]', &
+            'set yrange [-0.46:0.46]', &
             'set palette defined (0 "#9ecae1", 1 "#0072B2", 2 "#002b4d")', &
-            'set title "Heavy top, 100 000 steps of 0.5"', 'plot "torus.dat" index 0 using 1:2:3 with image', &
-            'set title "Close-up"', 'plot "torus.dat" index 1 using 1:2:3 with image', 'unset multiplot'
+            'set title "Heavy top, 100 000 steps of 0.5"', &
+            'plot "torus.dat" index 0 using 1:2:3 with image', &
+            'set title "Close-up"', 'set xrange [0.3972:0.4002]', 'set yrange [-0.06:0.06]', &
+            'set xtics 0.001', 'set ytics 0.02', 'set size noratio', &
+            'plot "torus.dat" index 1 using 1:2:3 with image', 'unset multiplot'
         close (unit)
         call draw(options, 'torus')
 

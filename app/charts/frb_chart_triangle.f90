@@ -2,7 +2,8 @@
 module frb_chart_triangle
     use frb, only: wp
     use frb_chart_methods, only: method, find_method, known
-    use frb_chart_output, only: settings, open_table, open_script, draw, progress, say, either, random_direction
+    use frb_chart_output, only: settings, open_table, open_script, draw, progress, say, either, &
+        random_direction
     use frb_chart_truth, only: free_case, new_case, errors_of
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
     use, intrinsic :: iso_fortran_env, only: int64
@@ -36,7 +37,8 @@ contains
         integer :: nx, ny, momenta, i, j, k, c, unit
         character(160) :: line
 
-        allocate (methods, source=pack([(find_method_or_none(wanted(i)), i=1, 3)], [(known(wanted(i)), i=1, 3)]))
+        allocate (methods, source=pack([(find_method_or_none(wanted(i)), i=1, 3)], [(known(wanted(i)), i=1, &
+            3)]))
         nx = merge(20, 100, options%quick)
         ny = nx/2
         momenta = merge(4, 20, options%quick)
@@ -66,7 +68,8 @@ contains
             end do
             call progress(options, name, i, nx)
         end do
-        call open_table(options, name, 'log10 of the error of one step h = 1, |m| = 1, over the shapes of a body, '// &
+        call open_table(options, name, &
+            'log10 of the error of one step h = 1, |m| = 1, over the shapes of a body, '// &
             title, 'I1/I3, I2/I3, then mean and largest log10 of the error for '//names_of(methods), unit)
         do j = 1, ny
             do i = 1, nx
@@ -74,7 +77,8 @@ contains
             end do
         end do
         do k = 1, size(methods)
-            write (line, '(2(a,f7.2))') '# '//methods(k)%key//' mean over the triangle ', mean_of(maps(2*k - 1, :, :)), &
+            write (line, '(2(a,f7.2))') '# '//methods(k)%key//' mean over the triangle ', &
+                mean_of(maps(2*k - 1, :, :)), &
                 ', largest ', largest_of(maps(2*k, :, :))
             write (unit, '(a)') trim(line)
             call say('  '//trim(line(3:)))
@@ -126,7 +130,8 @@ contains
         call open_script(options, name, 1000, 560, unit)
         write (unit, '(a)') 'set multiplot title "log_{10} of the error of one step h = 1, '//title//'"', &
             'set palette defined (0 "#fde725", 1 "#5ec962", 2 "#21918c", 3 "#3b528b", 4 "#440154")', &
-            'set cbrange [-16.5:-10.5]', 'set xrange [0:1]', 'set yrange [0.5:1]', 'set xtics 0.25', 'set ytics 0.1', &
+            'set cbrange [-16.5:-10.5]', 'set xrange [0:1]', 'set yrange [0.5:1]', 'set xtics 0.25', &
+            'set ytics 0.1', &
             'unset key', 'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0', 'set cbtics 1', &
             'set colorbox user origin 0.93,0.13 size 0.018,0.72'
         do row = 1, 2
@@ -134,7 +139,8 @@ contains
                 left = 0.075_wp + 0.285_wp*(k - 1)
                 write (unit, '(a,f6.4,a,f6.4)') 'set origin ', left, ',', merge(0.55_wp, 0.11_wp, row == 1)
                 write (unit, '(a)') 'set size 0.25,0.32', &
-                    'set title "'//escaped(trim(methods(k)%label))//', '//trim(which(row))//'" offset 0,-0.6', &
+                    'set title "'//escaped(trim(methods(k)%label))//', '//trim(which(row))// &
+                    '" offset 0,-0.6', &
                     either(k == 1, 'set ylabel "I_2/I_3" offset 1,0', 'unset ylabel'), &
                     either(row == 2, 'set xlabel "I_1/I_3" offset 0,0.5', 'unset xlabel')
                 write (unit, '(a,i0,a)') 'plot "'//name//'.dat" using 1:2:', 2*k + row, ' with image'

@@ -11,7 +11,8 @@ program frb_charts
     use frb_chart_triangle, only: chart_triangle
     use, intrinsic :: iso_fortran_env, only: error_unit
     implicit none
-    character(*), parameter :: names(*) = [character(16) :: 'speed', 'cost', 'work-precision', 'heavy-top', 'failure', &
+    character(*), parameter :: names(*) = [character(16) :: 'speed', 'cost', 'work-precision', 'heavy-top', &
+        'failure', &
         'growth', 'triangle', 'scale', 'orbits']
     type(settings) :: options
     character(:), allocatable :: argument
@@ -103,7 +104,8 @@ contains
         call say('  triangle        error of one step h = 1 over all shapes of a body')
         call say('  scale           time per body against the number of bodies')
         call say('  orbits          polhodes, the tennis racket, the torus of a heavy top')
-        call say('--quick: a minute for all of them; --out DIR: where the tables, scripts and pictures go (charts)')
+        call say('--quick: a minute for all of them; --out DIR: where the tables, scripts and '// &
+            'pictures go (charts)')
     end subroutine list_charts
 
     subroutine refuse(message)
