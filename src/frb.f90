@@ -6,6 +6,8 @@ module frb
         status_bad_torque, status_bad_scheme, status_no_period, status_lapack_failed
     use frb_rotations, only: quat_product, quat_conjugate, quat_rotate, quat_to_matrix, matrix_to_quat
     use frb_inertia, only: rigid_body, principal_axes
+    use frb_matrix_step, only: frb_step
+    use frb_quat_step, only: quat_step
     use frb_free_flow, only: free_flow
     use frb_carlson, only: rf, rc, rj, rd
     use frb_agm, only: ellip_k, ellip_f, jacobi_am, jacobi, landen_step

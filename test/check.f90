@@ -4,6 +4,7 @@ program check
     use, intrinsic :: iso_fortran_env, only: output_unit
     use frb_checks, only: tally
     use frb_test_base, only: test_base
+    use frb_test_steps, only: test_steps
     use frb_test_rivals, only: test_rivals
     use frb_test_files, only: test_files
     use frb_test_carlson, only: test_carlson
@@ -16,6 +17,7 @@ program check
     character(16) :: argument
 
     call test_base(t)
+    call test_steps(t)
     call test_rivals(t)
     call test_files(t)
     call test_carlson(t)

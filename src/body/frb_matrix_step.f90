@@ -1,0 +1,194 @@
+!> Algorithm 1: the free rigid body with the attitude as a rotation matrix.
+module frb_matrix_step
+    use frb_kinds, only: wp
+    use frb_paper_angle, only: exact_angle, quadrature_angle, angle_by_middle_axis
+    use frb_paper_momentum, only: momentum_step, momentum_by_addition, momentum_by_phase
+    use frb_paper_motion, only: paper_motion, normal_form, simple_motion, add_momentum, motion_elliptic
+    use frb_rotations, only: cross, norm3, quat_rotate, quat_to_matrix
+    use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_count
+    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+    implicit none
+    private
+
+    public :: frb_step, most_points
+
+    integer, parameter :: most_points = 1000    !! largest number of Gauss points of a step
+
+contains
+
+    !> One step of the free rigid body, m' = m x (m/I), Q' = Q hat(m/I): Algorithm 1 of the paper, with the
+    !> frame from m and m' (section 1.3) and the angle (9).
+    !>
+    !> Any norm of the momentum, any order of the moments, h of any sign and size: rescaling and reordering
+    !> (section 3.1) happen inside. Qin need not be orthogonal to rounding: Qout is Qin times a rotation.
+    !> Output may be the same variable as input. On the separatrix, about an axis, for two or three equal
+    !> moments and for no momentum the formulas of those motions are used.
+    !>
+    !> np absent or 0: exact. np >= 1: semi-exact, the integral of the third kind by np Gauss-Legendre points
+    !> (order 2 np in h, time-symmetric; |m|, the energy and Q m are kept all the same); for a small h only.
+    !>
+    !> Accuracy of the exact step, in units of the inherent sensitivity (data/reference): below 2 in every
+    !> group, orthogonal to 1e-14; checked by steps: reference-cases. The sensitivity itself grows near the middle axis
+    !> and the separatrix: m and Q lose about log10(1/(1 - k**2)) of their 16 digits once h covers a half turn,
+    !> all of them for 1 - k**2 below 1e-16, where m stays on the orbit and Q orthogonal. With np >= 1, Q loses
+    !> besides log10(|m|**2/(I1 |m'|)) digits where m' is small: the frame turns fast there.
+    !>
+    !> Errors: status_bad_moments (not positive and finite), status_bad_momentum, status_bad_time,
+    !> status_bad_attitude (not finite), status_bad_count (np < 0 or np > 1000). The output is then the input.
+    subroutine frb_step(Piout, Qout, h, aInert, Piin, Qin, np, stat)
+        ! inout and target, because output and input may be one variable: neither may a compiler assume that
+        ! they are not, nor may the input be undefined on entry. Input is read before output is written.
+        real(wp), intent(inout), target :: Piout(3)    !! body angular momentum at h
+        real(wp), intent(inout), target :: Qout(3, 3)  !! attitude at h, body to space
+        real(wp), intent(in) :: h                      !! step, any finite number
+        real(wp), intent(in), target :: aInert(3)      !! principal moments of inertia, any order
+        real(wp), intent(in), target :: Piin(3)        !! body angular momentum at 0
+        real(wp), intent(in), target :: Qin(3, 3)      !! attitude at 0, body to space
+        integer, intent(in), optional :: np            !! Gauss points; 0 or absent: exact
+        integer, intent(out), optional :: stat         !! status_ok, or what is wrong
+        type(paper_motion) :: motion
+        real(wp) :: start_m(3), start_q(3, 3), change(3), q(4)
+        integer :: code, points
+
+        start_m = Piin
+        start_q = Qin
+        points = 0
+        if (present(np)) points = np
+        call normal_form(h, aInert, start_m, motion, code)
+        if (code == status_ok) then
+            if (.not. all(ieee_is_finite(start_q))) code = status_bad_attitude
+            if (points < 0 .or. points > most_points) code = status_bad_count
+        end if
+        if (code /= status_ok) then
+            Piout = start_m
+            Qout = start_q
+        else if (motion%kind == motion_elliptic) then
+            call turn_elliptic(motion, points, start_q, change, Qout, code)
+            Piout = add_momentum(motion, start_m, change)
+        else
+            call simple_motion(motion, change, q)
+            call turn_simple(motion, start_q, quat_to_matrix(q), Qout)
+            Piout = add_momentum(motion, start_m, change)
+        end if
+        call conclude(code, 'frb_step', stat)
+    end subroutine frb_step
+
+    !> Qout = Qin R for a rotation R given in sorted axes.
+    pure subroutine turn_simple(motion, q_in, rotation, q_out)
+        type(paper_motion), intent(in) :: motion
+        real(wp), intent(in) :: q_in(3, 3), rotation(3, 3)
+        real(wp), intent(out) :: q_out(3, 3)
+        integer :: j
+
+        do j = 1, 3
+            q_out(:, motion%order(j)) = times(motion, q_in, rotation(:, j))
+        end do
+    end subroutine turn_simple
+
+    !> Qin u for a vector u in sorted axes.
+    pure function times(motion, q_in, u) result(v)
+        type(paper_motion), intent(in) :: motion
+        real(wp), intent(in) :: q_in(3, 3), u(3)
+        real(wp) :: v(3)
+
+        if (motion%sorted) then
+            v = q_in(:, 1)*u(1) + q_in(:, 2)*u(2) + q_in(:, 3)*u(3)
+        else
+            v = q_in(:, motion%order(1))*u(1) + q_in(:, motion%order(2))*u(2) + q_in(:, motion%order(3))*u(3)
+        end if
+    end function times
+
+    !> Lines (5) to (18) of Algorithm 1: Q = Qin P(0)^T Y(psi) P(h), P = [v, w, m]^T with v along m', (6).
+    subroutine turn_elliptic(motion, points, q_in, change, q_out, code)
+        type(paper_motion), intent(in) :: motion
+        integer, intent(in) :: points
+        real(wp), intent(in) :: q_in(3, 3)
+        real(wp), intent(out) :: change(3)
+        real(wp), intent(out) :: q_out(3, 3)
+        integer, intent(out) :: code
+        type(momentum_step) :: step
+        real(wp) :: v0(3), w0(3), v(3), w(3), cosine, sine, columns(3, 3)
+        integer :: j
+
+        code = status_ok
+        v0 = direction_of_derivative(motion, motion%m)
+        w0 = cross(motion%m, v0)
+        if (points > 0 .and. motion%kc2 > 0.0_wp) then
+            call momentum_by_phase(motion, step)
+            v = direction_of_derivative(motion, step%m)
+            call quadrature_turn(motion, step, points, cosine, sine, code)
+        else
+            call momentum_by_addition(motion, step)
+            v = direction_of_derivative(motion, step%m)
+            call exact_turn(motion, step, v0, w0, v, cosine, sine)
+        end if
+        w = cross(step%m, v)
+        change = step%change
+
+        columns(:, 1) = times(motion, q_in, v0)
+        columns(:, 2) = times(motion, q_in, w0)
+        columns(:, 3) = times(motion, q_in, motion%m)
+        do j = 1, 3
+            q_out(:, motion%order(j)) = columns(:, 1)*(cosine*v(j) - sine*w(j)) &
+                + columns(:, 2)*(sine*v(j) + cosine*w(j)) + columns(:, 3)*step%m(j)
+        end do
+    end subroutine turn_elliptic
+
+    !> Unit vector along m'. Rounding can put m(h) on an axis exactly; then any vector across m serves.
+    pure function direction_of_derivative(motion, m) result(v)
+        type(paper_motion), intent(in) :: motion
+        real(wp), intent(in) :: m(3)
+        real(wp) :: v(3)
+        real(wp) :: length
+
+        v(1) = -motion%alpha*m(2)*m(3)
+        v(2) = motion%beta*m(3)*m(1)
+        v(3) = -motion%gamma*m(1)*m(2)
+        length = norm3(v)
+        if (length < tiny(1.0_wp)) then
+            v = cross(m, merge([1.0_wp, 0.0_wp, 0.0_wp], [0.0_wp, 0.0_wp, 1.0_wp], abs(m(1)) < 0.7_wp))
+            length = norm3(v)
+        end if
+        v = v/length
+    end function direction_of_derivative
+
+    !> Cosine and sine of psi, exactly: P(0) z P(h)^T is a rotation about e3, and `angle` adds to it.
+    pure subroutine exact_turn(motion, step, v0, w0, v, cosine, sine)
+        type(paper_motion), intent(in) :: motion
+        type(momentum_step), intent(in) :: step
+        real(wp), intent(in) :: v0(3), w0(3), v(3)
+        real(wp), intent(out) :: cosine, sine
+        real(wp) :: angle, z(4), turned(3), x, y, scaling, cosine_angle, sine_angle
+
+        call exact_angle(motion, step, angle_by_middle_axis, angle, z)
+        turned = quat_rotate(z/sqrt(z(1)*z(1) + z(2)*z(2) + z(4)*z(4)), v)
+        x = v0(1)*turned(1) + v0(2)*turned(2) + v0(3)*turned(3)
+        y = w0(1)*turned(1) + w0(2)*turned(2) + w0(3)*turned(3)
+        scaling = x*x + y*y
+        if (scaling < tiny(1.0_wp)) then    ! a long stay at the middle axis has cost all digits
+            x = 1.0_wp
+            y = 0.0_wp
+            scaling = 1.0_wp
+        end if
+        scaling = 1/sqrt(scaling)
+        cosine_angle = cos(angle)*scaling
+        sine_angle = sin(angle)*scaling
+        cosine = x*cosine_angle - y*sine_angle
+        sine = y*cosine_angle + x*sine_angle
+    end subroutine exact_turn
+
+    !> Cosine and sine of psi by quadrature.
+    subroutine quadrature_turn(motion, step, points, cosine, sine, code)
+        type(paper_motion), intent(in) :: motion
+        type(momentum_step), intent(in) :: step
+        integer, intent(in) :: points
+        real(wp), intent(out) :: cosine, sine
+        integer, intent(out) :: code
+        real(wp) :: psi
+
+        psi = quadrature_angle(motion, step, angle_by_middle_axis, points, code)
+        cosine = cos(psi)
+        sine = sin(psi)
+    end subroutine quadrature_turn
+
+end module frb_matrix_step
