@@ -17,6 +17,7 @@ module frb
     use frb_schemes, only: splitting_scheme, scheme_names, mirrored
     use frb_torque, only: body_scene, group_scene, body_observer, group_observer, body_drift
     use frb_scenes, only: heavy_top, plain_scene
+    use frb_drifts, only: flow_drift, matrix_drift, quaternion_drift, drift_by_name
     use frb_splitting, only: integrate
     use frb_invariants, only: kinetic_energy, total_energy, spatial_momentum, norm_defect, invariant_monitor
     implicit none
@@ -34,6 +35,7 @@ module frb
     public :: gauss_legendre, eint_gauss
     public :: splitting_scheme, scheme_names, mirrored, order_report, order_conditions
     public :: body_scene, group_scene, body_observer, group_observer, body_drift, heavy_top, plain_scene
+    public :: flow_drift, matrix_drift, quaternion_drift, drift_by_name
     public :: integrate
     public :: kinetic_energy, total_energy, spatial_momentum, norm_defect, invariant_monitor
 

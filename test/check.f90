@@ -10,6 +10,7 @@ program check
     use frb_test_carlson, only: test_carlson
     use frb_test_agm, only: test_agm
     use frb_test_schemes, only: test_schemes
+    use frb_test_drifts, only: test_drifts
     use frb_test_splitting, only: test_splitting
     use frb_test_groups, only: test_groups
     implicit none
@@ -23,6 +24,7 @@ program check
     call test_carlson(t)
     call test_agm(t)
     call test_schemes(t)
+    call test_drifts(t)
     call test_splitting(t)
     call test_groups(t)
 

@@ -1,0 +1,143 @@
+!> Drifts by name, to be compared in the same loop: the free flow and the paper's two steps, exact or
+!> semi-exact.
+module frb_drifts
+    use frb_free_flow, only: free_flow
+    use frb_inertia, only: rigid_body
+    use frb_kinds, only: wp
+    use frb_matrix_step, only: frb_step
+    use frb_quat_step, only: quat_step
+    use frb_rotations, only: matrix_to_quat, quat_conjugate, quat_product, quat_rotate
+    use frb_status, only: conclude, status_ok, status_bad_option
+    use frb_torque, only: body_drift
+    implicit none
+    private
+
+    public :: flow_drift, matrix_drift, quaternion_drift, drift_by_name
+
+    !> The free flow, as `integrate` uses it when no drift is given.
+    type, extends(body_drift) :: flow_drift
+    contains
+        procedure :: advance => advance_by_flow
+    end type flow_drift
+
+    !> The paper's Algorithm 1, `frb_step`.
+    type, extends(body_drift) :: matrix_drift
+        integer :: points = 0       !! Gauss points; 0: exact
+    contains
+        procedure :: advance => advance_by_matrix
+    end type matrix_drift
+
+    !> The paper's Algorithm 2, `quat_step`.
+    type, extends(body_drift) :: quaternion_drift
+        integer :: points = 0       !! Gauss points; 0: exact
+        integer :: frame = 1        !! 1, 2 or 3
+    contains
+        procedure :: advance => advance_by_quaternion
+    end type quaternion_drift
+
+contains
+
+    !> The drift with the name `free_flow`, `frb_step` or `quat_step`; the last two may be followed by a colon
+    !> and a number of Gauss points, 1 to 1000, for the semi-exact step: `quat_step:3`.
+    !> Any other name: `status_bad_option`, and the free flow.
+    subroutine drift_by_name(name, drift, stat)
+        character(*), intent(in) :: name
+        class(body_drift), allocatable, intent(out) :: drift
+        integer, intent(out), optional :: stat
+        integer, parameter :: most_digits = 4, most_points = 1000
+        character(:), allocatable :: digits
+        integer :: colon, points, code
+
+        code = status_ok
+        points = 0
+        colon = index(name, ':')
+        if (colon > 0) then
+            digits = trim(name(colon + 1:))
+            if (len(digits) < 1 .or. len(digits) > most_digits .or. verify(digits, '0123456789') > 0) then
+                code = status_bad_option
+            else
+                read (digits, *) points
+                if (points < 1 .or. points > most_points) code = status_bad_option
+            end if
+        else
+            colon = len_trim(name) + 1
+        end if
+        if (code == status_ok) then
+            select case (name(:colon - 1))
+            case ('frb_step')
+                allocate (drift, source=matrix_drift(points))
+            case ('quat_step')
+                allocate (drift, source=quaternion_drift(points))
+            case default
+                if (name /= 'free_flow') code = status_bad_option
+            end select
+        end if
+        if (.not. allocated(drift)) allocate (flow_drift :: drift)
+        call conclude(code, 'drift_by_name', stat)
+    end subroutine drift_by_name
+
+    subroutine advance_by_flow(self, body, h, m, q, stat)
+        class(flow_drift), intent(in) :: self
+        type(rigid_body), intent(in) :: body
+        real(wp), intent(in) :: h
+        real(wp), intent(inout) :: m(3), q(4)
+        integer, intent(out) :: stat
+
+        associate (unused => self)
+        end associate
+        call free_flow(body, h, m, q, stat)
+    end subroutine advance_by_flow
+
+    !> The turn as a matrix from the identity, then a quaternion: q times it.
+    subroutine advance_by_matrix(self, body, h, m, q, stat)
+        class(matrix_drift), intent(in) :: self
+        type(rigid_body), intent(in) :: body
+        real(wp), intent(in) :: h
+        real(wp), intent(inout) :: m(3), q(4)
+        integer, intent(out) :: stat
+        real(wp), parameter :: identity(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, &
+                                                         0.0_wp, 0.0_wp, 1.0_wp], [3, 3])
+        real(wp) :: turn(3, 3), m_new(3)
+
+        call to_principal(body, m, q)
+        m_new = m
+        turn = identity
+        call frb_step(m_new, turn, h, body%moments, m, identity, self%points, stat)
+        m = m_new
+        q = quat_product(q, matrix_to_quat(turn))
+        call from_principal(body, m, q)
+    end subroutine advance_by_matrix
+
+    subroutine advance_by_quaternion(self, body, h, m, q, stat)
+        class(quaternion_drift), intent(in) :: self
+        type(rigid_body), intent(in) :: body
+        real(wp), intent(in) :: h
+        real(wp), intent(inout) :: m(3), q(4)
+        integer, intent(out) :: stat
+
+        call to_principal(body, m, q)
+        call quat_step(m, q, h, body%moments, m, q, self%points, self%frame, stat)
+        call from_principal(body, m, q)
+    end subroutine advance_by_quaternion
+
+    !> From the axes of a tensor to principal axes.
+    pure subroutine to_principal(body, m, q)
+        type(rigid_body), intent(in) :: body
+        real(wp), intent(inout) :: m(3), q(4)
+
+        if (.not. body%turned) return
+        m = quat_rotate(quat_conjugate(body%axes_q), m)
+        q = quat_product(q, body%axes_q)
+    end subroutine to_principal
+
+    !> And back.
+    pure subroutine from_principal(body, m, q)
+        type(rigid_body), intent(in) :: body
+        real(wp), intent(inout) :: m(3), q(4)
+
+        if (.not. body%turned) return
+        m = quat_rotate(body%axes_q, m)
+        q = quat_product(q, quat_conjugate(body%axes_q))
+    end subroutine from_principal
+
+end module frb_drifts

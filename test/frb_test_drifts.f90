@@ -1,0 +1,127 @@
+!> Drifts by name: the paper's steps and the free flow in the same loop.
+module frb_test_drifts
+    use frb_checks, only: tally
+    use frb_drifts, only: drift_by_name, flow_drift, matrix_drift, quaternion_drift
+    use frb_inertia, only: rigid_body
+    use frb_kinds, only: wp
+    use frb_scenes, only: heavy_top
+    use frb_schemes, only: splitting_scheme
+    use frb_splitting, only: integrate
+    use frb_status, only: status_ok, status_bad_option
+    use frb_torque, only: body_drift
+    use frb_torque_cases, only: top_case, known_top, distance
+    implicit none
+    private
+
+    public :: test_drifts
+
+    real(wp), parameter :: eps = epsilon(1.0_wp)
+
+contains
+
+    subroutine test_drifts(t)
+        type(tally), intent(inout) :: t
+
+        call t%open_suite('drifts', 34)
+        call test_runs(t)
+        call test_names(t)
+        call t%close_suite()
+    end subroutine test_drifts
+
+    !> The same run with every drift.
+    subroutine test_runs(t)
+        type(tally), intent(inout) :: t
+        character(12), parameter :: names(5) = [character(12) :: 'free_flow', 'frb_step', 'quat_step', &
+                                                'frb_step:10', 'quat_step:10']
+        class(body_drift), allocatable :: drift
+        type(quaternion_drift) :: other_frame
+        type(top_case) :: item
+        type(splitting_scheme) :: scheme
+        type(heavy_top) :: top
+        real(wp) :: m(3), q(4), m_flow(3), q_flow(4), tensor(3, 3), error(2)
+        integer :: i, k, n, stat
+
+        scheme = splitting_scheme('srkn14')
+        do k = 1, 2
+            item = known_top(k)
+            do i = 1, size(names)
+                call drift_by_name(trim(names(i)), drift, stat)
+                m = item%m0
+                q = item%q0
+                call integrate(item%body, scheme, item%top, item%t/400, 400, m, q, drift=drift, stat=stat)
+                call t%equal(trim(names(i))//'-comes-to-the-end', stat, status_ok)
+                call t%at_most(trim(names(i))//'-ends-where-the-taylor-series-does', &
+                               distance(m, q, item%m, item%q), 8192*eps)
+            end do
+        end do
+        do i = 2, 3
+            other_frame%frame = i
+            m = item%m0
+            q = item%q0
+            call integrate(item%body, scheme, item%top, item%t/400, 400, m, q, drift=other_frame)
+            call t%at_most('the-papers-other-frames-end-there-too', distance(m, q, item%m, item%q), 8192*eps)
+        end do
+
+        ! One Gauss point makes the drift, so the run, second order, whatever the scheme.
+        do i = 1, 2
+            n = 200*i
+            m = item%m0
+            q = item%q0
+            call integrate(item%body, scheme, item%top, item%t/n, n, m, q, drift=quaternion_drift(points=1))
+            error(i) = distance(m, q, item%m, item%q)
+        end do
+        call t%close_to('one-gauss-point-makes-order-two', log(error(1)/error(2))/log(2.0_wp), 2.0_wp, 0.2_wp)
+
+        ! A body by its tensor, in axes that are not principal.
+        tensor = reshape([1.0_wp, 0.2_wp, 0.1_wp, 0.2_wp, 1.5_wp, -0.3_wp, 0.1_wp, -0.3_wp, 2.0_wp], [3, 3])
+        do i = 1, 3
+            call drift_by_name(trim(names(i)), drift)
+            m = [1.0_wp, -0.5_wp, 0.7_wp]
+            q = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+            call integrate(rigid_body(tensor), scheme, top, 0.1_wp, 50, m, q, drift=drift)
+            if (i == 1) then
+                m_flow = m
+                q_flow = q
+            else
+                call t%at_most('drifts-agree-for-a-body-by-its-tensor', &
+                               distance(m, q, m_flow, q_flow), 1024*eps)
+            end if
+        end do
+    end subroutine test_runs
+
+    !> Names known and refused.
+    subroutine test_names(t)
+        type(tally), intent(inout) :: t
+        character(14), parameter :: wrong(7) = [character(14) :: 'dmv', 'frb_step:', 'frb_step:0', &
+                                                'quat_step:x', 'quat_step:1001', 'free_flow:3', '']
+        class(body_drift), allocatable :: drift
+        integer :: i, stat
+        logical :: right
+
+        do i = 1, size(wrong)
+            call drift_by_name(trim(wrong(i)), drift, stat)
+            right = .false.
+            select type (drift)
+            type is (flow_drift)
+                right = .true.
+            end select
+            call t%ok('a-name-that-is-none-is-refused-and-gives-the-free-flow', &
+                      right .and. stat == status_bad_option)
+        end do
+        call drift_by_name('quat_step:17', drift, stat)
+        right = .false.
+        select type (drift)
+        type is (quaternion_drift)
+            right = drift%points == 17 .and. drift%frame == 1
+        end select
+        call t%ok('quat-step-with-17-points', right .and. stat == status_ok)
+        call drift_by_name('frb_step', drift, stat)
+        right = .false.
+        select type (drift)
+        type is (matrix_drift)
+            right = drift%points == 0
+        end select
+        call t%ok('frb-step-is-exact-unless-told', right .and. stat == status_ok)
+    end subroutine test_names
+
+end module frb_test_drifts
