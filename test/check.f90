@@ -13,6 +13,8 @@ program check
     use frb_test_drifts, only: test_drifts
     use frb_test_splitting, only: test_splitting
     use frb_test_groups, only: test_groups
+    use frb_test_legendre, only: test_legendre
+    use frb_test_quadrature, only: test_quadrature
     implicit none
     type(tally) :: t
     character(16) :: argument
@@ -27,6 +29,8 @@ program check
     call test_drifts(t)
     call test_splitting(t)
     call test_groups(t)
+    call test_legendre(t)
+    call test_quadrature(t)
 
     call get_command_argument(1, argument)
     if (argument == '--fail') then

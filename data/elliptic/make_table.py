@@ -9,6 +9,7 @@ One record a line, blanks between: name, number of inputs, the inputs, the value
     k kc2                                               complete integral, first kind
     f phi kc2   am u kc2   sn u kc2   cn u kc2   dn u kc2
     pi phi n kc2    pid phi1 phi2 n kc2                 third kind, (22), from 0 and from phi1 to phi2
+    gx p i   gw p i                                     node i (ascending) and weight of the p-point Gauss rule
 
 kc2 is 1 - k**2.
 """
@@ -66,14 +67,25 @@ def big_pi(phi, n, kc2):
 
     def part(s, c):
         dd = c * c + kc2 * s * s
-        return s * mp.elliprf(c * c, dd, one) + n / 3 * s ** 3 * mp.elliprj(c * c, dd, one, c * c + (1 - n) * s * s)
+        third = mp.elliprj(c * c, dd, one, c * c + (1 - n) * s * s)
+        return s * mp.elliprf(c * c, dd, one) + n / 3 * s ** 3 * third
     value = part(mp.sin(t), mp.cos(t))
     if turns:
         value += 2 * turns * part(one, mp.mpf(0))
     return value
 
 
+def gauss(points, i):
+    """Node i and its weight, by the secant method on the Legendre polynomial."""
+    start = -mp.cos(mp.pi * (i - mp.mpf(1) / 4) / (points + mp.mpf(1) / 2))
+    x = mp.findroot(lambda t: mp.legendre(points, t), (start, start + mp.mpf(10) ** -6))
+    slope = points * (x * mp.legendre(points, x) - mp.legendre(points - 1, x)) / (x * x - 1)
+    return x, 2 / ((1 - x * x) * slope ** 2)
+
+
 def value_of(name, args):
+    if name in ("gx", "gw"):
+        return gauss(int(args[0]), int(args[1]))[name == "gw"]
     if name in ("rf", "rc", "rj", "rd"):
         return carlson(name, args)
     a = [mp.mpf(x) for x in args]
@@ -92,6 +104,8 @@ def value_of(name, args):
 
 def digits_needed(name, args):
     """cn and dn can be as small as sqrt(kc2), 1 - n sin**2 as large as 1e300; RJ needs the digits of p."""
+    if name in ("gx", "gw"):
+        return 40
     if name == "rj" and abs(args[3]) < 1e-200:
         return 400
     return 700 if min(args) < -1e20 or name not in ("rf", "rc", "rj", "rd") and args[-1] < 1e-15 else 60
@@ -165,6 +179,8 @@ def main():
     jobs += [("pi", a) for a in ([half_pi, 0.3, 0.5], [half_pi, 0.0, 0.5], [half_pi, -2.0, 0.5], [0.5, 0.999, 0.1],
                                  [1.2, -1e300, 0.5], [1.0, 2.0 ** -1074, 0.5], [0.5, 2.0, 0.5], [half_pi, -1e10, 1e-10],
                                  [1.0, -5.0, 1.0], [1.0, -1.0, 0.3], [1.0, 1.0, 0.5], [half_pi, 1 - 1e-13, 1e-12])]
+    jobs += [(name, [points, i]) for points in (1, 2, 3, 5, 8, 10, 11, 24, 64)
+             for i in range(1, points + 1, 1 if points < 11 else 7) if 2 * i != points + 1 for name in ("gx", "gw")]
     for name, args in jobs:
         mp.mp.dps = digits_needed(name, args)
         value = value_of(name, args)

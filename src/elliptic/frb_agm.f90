@@ -12,8 +12,9 @@
 !>
 !> so the step up costs a division, the step down, y(n) = (w(n+1) +- y(n+1))/2, a square root, and neither a
 !> tangent nor an arcsine; at the end y(0) = cn/sn and w(0) = dn/sn, without cancellation as k tends to 1.
-!> The half turns that the cotangent does not see are counted: their number doubles at each step up, plus
-!> one where y(n) < 0; on the way down their lowest bit gives the sign of y(n).
+!> Once a and b are close, three terms of a series in c = (a - b)/(a + b) replace the remaining two or three
+!> steps. The half turns that the cotangent does not see are counted: their number doubles at each step up,
+!> plus one where y(n) < 0; on the way down their lowest bit gives the sign of y(n).
 module frb_agm
     use frb_kinds, only: wp, pi, half_pi
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_value, ieee_quiet_nan, ieee_positive_inf
@@ -25,8 +26,11 @@ module frb_agm
     !> 1 - k**2 = 5e-324, the smallest above zero, takes 13 steps.
     integer, parameter :: most_steps = 16
 
-    !> Once a and b agree to this they agree to rounding one step later: their distance is squared, over 8.
-    real(wp), parameter :: nearly_equal = 2.0e-8_wp
+    !> Once c = (a - b)/(a + b) is below this, the rest of the transformation is a short series in c.
+    real(wp), parameter :: series_radius = 1.0e-4_wp
+
+    !> The same for the mean alone, which is even in c: the first term left out is 11 c**6/256.
+    real(wp), parameter :: mean_radius = 3.0e-3_wp
 
     !> Below this an angle equals its sine, its integral F and its amplitude to rounding: u**3/6 < eps u/4.
     real(wp), parameter :: small_angle = 1.0e-8_wp
@@ -41,10 +45,12 @@ module frb_agm
     !> The sequence from 1 and sqrt(kc2), as far as it is needed.
     type :: agm_sequence
         integer :: steps = 0                  !! N
-        real(wp) :: mean = 1.0_wp             !! a(N)
-        real(wp) :: scale = 1.0_wp            !! 2**N
+        real(wp) :: mean = 1.0_wp             !! the limit of a(n)
+        real(wp) :: power = 1.0_wp            !! 2**N
+        real(wp) :: top = 1.0_wp              !! 2**N a(N)
+        real(wp) :: c = 0.0_wp                !! (a(N) - b(N))/(a(N) + b(N)), at most `series_radius`
         real(wp) :: product(0:most_steps)     !! 4**n a(n) b(n), n = 0..N-1
-        real(wp) :: square(0:most_steps)      !! 4**n b(n)**2, n = 0..N-1
+        real(wp) :: square(0:most_steps)      !! 4**n b(n)**2, n = 0..N
     end type agm_sequence
 
 contains
@@ -68,12 +74,12 @@ contains
         else
             a = 1.0_wp
             b = sqrt(complement)
-            do while (abs(a - b) > nearly_equal*a)
+            do while (abs(a - b) > mean_radius*(a + b))
                 next = 0.5_wp*(a + b)
                 b = sqrt(a*b)
                 a = next
             end do
-            value = pi/(a + b)
+            value = half_pi/mean_of(a, b, (a - b)/(a + b))
         end if
     end function ellip_k
 
@@ -106,7 +112,7 @@ contains
         else
             call half_turns(phi, turns, rest)
             call start_agm(complement, agm)
-            value = (turns*pi + scaled_angle(sin(rest), cos(rest), agm)/agm%scale)/agm%mean
+            value = (turns*pi + scaled_angle(sin(rest), cos(rest), agm)/agm%power)/agm%mean
         end if
     end function ellip_f
 
@@ -183,7 +189,7 @@ contains
             phi0 = atan2(sn0, cn0)
             if (complement > 0.0_wp) then
                 call start_agm(complement, agm)
-                call descend(scaled_angle(sn0, cn0, agm)/agm%scale, du, agm, sn, cn, dn, phi1)
+                call descend(scaled_angle(sn0, cn0, agm)/agm%power, du, agm, sn, cn, dn, phi1)
             else
                 call separatrix_step(sn0, cn0, du, sn, cn, phi1)
                 dn = abs(cn)
@@ -234,46 +240,58 @@ contains
         end if
     end subroutine complement_of
 
-    !> The sequence for 1 - k**2 = kc2 > 0, to the step where a and b agree to rounding.
+    !> The sequence for 1 - k**2 = kc2 > 0, to the step where the series take over.
     pure subroutine start_agm(kc2, agm)
         real(wp), intent(in) :: kc2
         type(agm_sequence), intent(out) :: agm
-        real(wp) :: a, b, ab, next, power
+        real(wp) :: a, b, ab, power
         integer :: n
-        logical :: last
 
         a = 1.0_wp
         b = sqrt(kc2)
         power = 1.0_wp
-        do n = 0, most_steps - 1
+        do n = 0, most_steps
+            agm%square(n) = (power*b)**2
+            if (abs(a - b) <= series_radius*(a + b) .or. n == most_steps) exit
             ab = a*b
             agm%product(n) = (power*power)*ab
-            agm%square(n) = (power*b)**2
-            last = abs(a - b) <= nearly_equal*a
-            next = 0.5_wp*(a + b)
+            a = 0.5_wp*(a + b)
             b = sqrt(ab)
-            a = next
             power = 2*power
-            if (last) exit
         end do
-        agm%steps = min(n + 1, most_steps)
-        agm%scale = power
-        agm%mean = a
+        agm%steps = n
+        agm%power = power
+        agm%top = power*a
+        agm%c = (a - b)/(a + b)
+        agm%mean = mean_of(a, b, agm%c)
     end subroutine start_agm
 
-    !> phi(N) for the angle phi(0) in [-pi, pi] with the given sine and cosine (up to a common factor).
+    !> Limit of the sequence from a and b with c = (a - b)/(a + b) small:
+    !> (a + b)/2 agm(1, sqrt(1 - c**2)) = (a + b)/2 (1 - c**2/4 - 5 c**4/64 - ..).
+    pure function mean_of(a, b, c) result(mean)
+        real(wp), intent(in) :: a, b, c
+        real(wp) :: mean
+
+        mean = 0.5_wp*(a + b)
+        mean = mean - mean*(c*c)*(0.25_wp + (5.0_wp/64)*(c*c))
+    end function mean_of
+
+    !> 2**N a F for the angle in [-pi, pi] with the given sine and cosine (up to a common factor), a the
+    !> limit.
+    !> Above step N the transformation (17) is, but for terms in c**4,
+    !> phi -> phi - (c/2 + c**3/16) sin(2 phi) + (3 c**2/16) sin(4 phi) - (5 c**3/48) sin(6 phi).
     pure function scaled_angle(sine, cosine, agm) result(angle)
         real(wp), intent(in) :: sine, cosine
         type(agm_sequence), intent(in) :: agm
         real(wp) :: angle
-        real(wp) :: y, s, turns
+        real(wp) :: y, s, turns, s2, c2, inverse
         integer :: n
 
         s = abs(sine)
         if (s <= small_angle*abs(cosine)) then
             angle = 0.0_wp
-            if (s > 0.0_wp) angle = agm%scale*agm%mean*s/abs(cosine)
-            if (cosine < 0.0_wp) angle = agm%scale*pi - angle
+            if (s > 0.0_wp) angle = agm%power*agm%mean*s/abs(cosine)
+            if (cosine < 0.0_wp) angle = agm%power*pi - angle
         else
             y = cosine/s
             turns = 0.0_wp
@@ -283,7 +301,12 @@ contains
                 if (y < 0.0_wp) turns = turns + 1
                 y = y - agm%product(n)/y
             end do
-            angle = turns*pi + atan2(agm%scale*agm%mean, y)
+            inverse = 1/(y*y + agm%top*agm%top)
+            s2 = 2*y*agm%top*inverse
+            c2 = (y*y - agm%top*agm%top)*inverse
+            angle = atan2(agm%top, y) - agm%c*s2*(0.5_wp + agm%c*(-0.375_wp*c2 &
+                + agm%c*(0.375_wp - (5.0_wp/12)*s2*s2)))
+            angle = turns*pi + angle
         end if
         angle = sign(angle, sine)
     end function scaled_angle
@@ -309,22 +332,32 @@ contains
         end if
     end subroutine functions_at
 
-    !> From phi(N)/2**N = start + a(N) du down to sn, cn, dn and, where asked for, the amplitude.
+    !> From a F = start + a du, a the limit of the sequence, down to sn, cn, dn and, where asked for, the
+    !> amplitude. Above step N the transformation is, but for terms in c**4,
+    !> phi -> phi + (c/2 + 3 c**3/32) sin(2 phi) + (c**2/16) sin(4 phi) + (c**3/96) sin(6 phi).
     pure subroutine descend(start, du, agm, sn, cn, dn, phi)
         real(wp), intent(in) :: start, du
         type(agm_sequence), intent(in) :: agm
         real(wp), intent(out) :: sn, cn, dn
         real(wp), intent(out), optional :: phi
-        real(wp) :: angle, turns, rest, y, w, s, large, sense
+        real(wp) :: angle, turns, rest, y, w, s, c, s2, c2, shift, large, sense
         integer :: n, count
         logical :: negative
 
         call half_turns(start + agm%mean*du, turns, rest)
         sense = 1 - 2*abs(turns - 2*anint(0.5_wp*turns))   ! (-1)**turns
-        angle = agm%scale*abs(rest)
+        angle = agm%power*abs(rest)
         count = int(angle*(1/pi))
         s = sin(angle)
-        y = cos(angle)
+        c = cos(angle)
+        s2 = 2*s*c
+        c2 = (c - s)*(c + s)
+        shift = agm%c*s2*(0.5_wp + agm%c*(0.125_wp*c2 + agm%c*(0.125_wp - (1.0_wp/24)*s2*s2)))
+        ! sine and cosine of angle + shift, |shift| <= 5e-5
+        s2 = shift*(1 - shift*shift*(1.0_wp/6))
+        c2 = 0.5_wp*shift*shift
+        y = c - (s*s2 + c*c2)
+        s = s + (c*s2 - s*c2)
         if (btest(count, 0)) then
             s = -s
             y = -y
@@ -334,8 +367,8 @@ contains
             y = -y
             count = count + merge(-1, 1, y < 0.0_wp)
         end if
-        y = agm%scale*agm%mean*y/max(s, 1/far)
-        w = sqrt(y*y + (agm%scale*agm%mean)**2)
+        y = agm%top*y/max(s, 1/far)
+        w = sqrt(y*y + agm%square(agm%steps))
         do n = agm%steps - 1, 0, -1
             negative = btest(count, 0)
             count = count/2

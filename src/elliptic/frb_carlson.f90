@@ -132,14 +132,14 @@ contains
         real(wp), intent(in) :: x, y, z, p
         real(wp), intent(out) :: first   !! RF(x, y, z)
         real(wp), intent(out) :: third   !! RJ(x, y, z, p)
-        real(wp) :: xn, yn, zn, pn, total, quarter, quarter_root
+        real(wp) :: xn, yn, zn, pn, total, quarter
 
         if (rj_is_plain(x, y, z, p)) then
             xn = x
             yn = y
             zn = z
             pn = p
-            call rj_duplications(xn, yn, zn, pn, total, quarter, quarter_root)
+            call rj_duplications(xn, yn, zn, pn, total, quarter)
             third = total + quarter*rj_series(xn, yn, zn, pn)
             first = rf_series(xn, yn, zn)
         else
@@ -269,15 +269,13 @@ contains
     !> Duplications until x, y, z, p are within `rj_radius` of their mean; then, with the changed arguments,
     !> RJ = total + quarter RJ(x, y, z, p) and RF is unchanged.
     !> total = sum of 6 4**-n/d_n RC(1, 1 + e_n), e_n = delta/(64**n d_n**2), (Carlson 1995, section 2.3).
-    pure subroutine rj_duplications(x, y, z, p, total, quarter, quarter_root)
+    pure subroutine rj_duplications(x, y, z, p, total, quarter)
         real(wp), intent(inout) :: x, y, z, p
         real(wp), intent(out) :: total, quarter
-        real(wp), intent(out), optional :: quarter_root
         real(wp) :: sx, sy, sz, sp, lambda, mean, distance, d, inverse, delta, e
 
         total = 0.0_wp
         quarter = 1.0_wp
-        if (present(quarter_root)) quarter_root = 1.0_wp
         mean = 0.2_wp*(x + y + z + 2*p)
         distance = max(abs(mean - x), abs(mean - y), abs(mean - z), abs(mean - p))/rj_radius
         delta = (p - x)*(p - y)*(p - z)
