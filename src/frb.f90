@@ -23,7 +23,7 @@ module frb
     implicit none
     private
 
-    public :: wp
+    public :: wp, frb_step, quat_step
     public :: status_message, status_ok, status_bad_moments, status_bad_tensor
     public :: status_bad_momentum, status_bad_attitude, status_bad_time, status_bad_count, status_bad_option
     public :: status_bad_torque, status_bad_scheme, status_no_period, status_lapack_failed

@@ -237,6 +237,7 @@ contains
         type(tally), intent(inout) :: t
         character(*), parameter :: out_path = 'build/test_out.dat'
         real(wp), parameter :: record(4) = [0.1_wp, -1.0_wp/3, 1.0e-300_wp, -1.7976931348623157e308_wp]
+        integer, parameter :: nothing = 0, only_whole = 1, only_part = 2
         type(out_file) :: out
         character(:), allocatable :: error
         real(wp) :: back(4, 2)
@@ -247,18 +248,16 @@ contains
         call out%open_for_writing(out_path, error)
         call t%ok('output-opens', .not. allocated(error))
         call out%write_record(record, error)
-        call t%ok('output-has-no-name-before-it-is-complete', .not. exists(out_path) &
-                    .and. exists(out_path//'.part'))
+        call t%equal('output-has-no-name-before-it-is-complete', traces(out_path), only_part)
         call out%discard()
-        call t%ok('discarded-output-leaves-nothing', .not. exists(out_path) .and. .not. exists(out_path// &
-                    '.part'))
+        call t%equal('discarded-output-leaves-nothing', traces(out_path), nothing)
 
         call out%open_for_writing(out_path, error)
         call out%write_record(record, error)
         call out%write_record(-record, error)
         call out%commit(error)
         call t%ok('output-is-committed', .not. allocated(error))
-        call t%ok('committed-output-has-its-name', exists(out_path) .and. .not. exists(out_path//'.part'))
+        call t%equal('committed-output-has-its-name', traces(out_path), only_whole)
         open (newunit=unit, file=out_path, status='old', action='read')
         read (unit, *, iostat=io) back(:, 1)
         read (unit, *, iostat=io) back(:, 2)
@@ -270,14 +269,14 @@ contains
 
         call out%open_for_writing(out_path, error)
         call out%discard()
-        call t%ok('failed-run-keeps-the-older-output', exists(out_path))
+        call t%equal('failed-run-keeps-the-older-output', traces(out_path), only_whole)
         call out%open_for_writing('build/no_such_folder/out.dat', error)
         call t%ok('output-in-a-missing-folder-is-refused', says(error, &
                     'build/no_such_folder/out.dat: cannot'))
         call out%open_for_writing('build', error)
         if (.not. allocated(error)) call out%commit(error)
         call t%ok('output-that-is-a-folder-is-refused', says(error, 'build: cannot be made'))
-        call t%ok('refused-output-leaves-nothing', .not. exists('build.part'))
+        call t%equal('refused-output-leaves-nothing', traces('build'), only_whole)
         call t%close_suite()
     end subroutine test_out
 
@@ -348,12 +347,15 @@ contains
         if (io == 0) close (unit, status='delete')
     end subroutine remove_file
 
-    !> Whether there is a file of this name.
-    function exists(name)
+    !> What there is of an output: 1 for the file itself, plus 2 for its unfinished part.
+    function traces(name)
         character(*), intent(in) :: name
-        logical :: exists
+        integer :: traces
+        logical :: whole, part
 
-        inquire (file=name, exist=exists)
-    end function exists
+        inquire (file=name, exist=whole)
+        inquire (file=name//'.part', exist=part)
+        traces = merge(1, 0, whole) + merge(2, 0, part)
+    end function traces
 
 end module frb_test_files

@@ -7,16 +7,22 @@
 module frb_out_files
     use frb_kinds, only: wp
     use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char
+    use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
     public :: out_file
+
+    !> How a number is written, and how many characters that takes.
+    character(*), parameter :: record_format = '(*(es25.16e3))'
+    integer, parameter :: number_width = 25
 
     !> An output file, from `open_for_writing` to `commit` or `discard`.
     type :: out_file
         character(:), allocatable :: path   !! the name the file will have
         character(:), allocatable, private :: temporary
         integer, private :: unit = 0
+        integer(int64), private :: length = 0   !! of the file so far, in characters
     contains
         procedure :: open_for_writing
         procedure :: write_record
@@ -44,6 +50,7 @@ contains
         character(200) :: reason
 
         self%path = trim(path)
+        self%length = 0
         self%temporary = self%path//'.part'
         if (index(self%path, '/dev/') == 1) self%temporary = self%path
         open (newunit=self%unit, file=self%temporary, status='unknown', action='write', form='formatted', &
@@ -58,7 +65,8 @@ contains
         character(:), allocatable, intent(out) :: error
         integer :: io
 
-        write (self%unit, '(*(es25.16e3))', iostat=io) values
+        write (self%unit, record_format, iostat=io) values
+        self%length = self%length + number_width*size(values) + len(new_line('a'))
         if (io /= 0) error = self%path//': cannot be written (is the disk full?)'
     end subroutine write_record
 
@@ -66,17 +74,23 @@ contains
     subroutine commit(self, error)
         class(out_file), intent(inout) :: self
         character(:), allocatable, intent(out) :: error
+        integer(int64) :: length
         integer :: io
 
+        if (self%temporary == self%path) then
+            close (self%unit, iostat=io)
+            return
+        end if
+        ! Not every run-time library reports a full disk: only the length on the disk tells.
         flush (self%unit, iostat=io)
-        if (io /= 0) then
+        inquire (file=self%temporary, size=length)
+        if (io /= 0 .or. length /= self%length) then
             call self%discard()
             error = self%path//': cannot be written (is the disk full?)'
             return
         end if
         close (self%unit, iostat=io)
-        if (io == 0 .and. self%temporary /= self%path) &
-            io = int(c_rename(self%temporary//c_null_char, self%path//c_null_char))
+        if (io == 0) io = int(c_rename(self%temporary//c_null_char, self%path//c_null_char))
         if (io /= 0) then
             open (newunit=self%unit, file=self%temporary, status='old', iostat=io)
             if (io == 0) call self%discard()

@@ -1,0 +1,153 @@
+!> The command line of the driver programs: `driver_exampleN [INIT] [-o OUT]`, `--help`, `--version`.
+!>
+!> What is wrong is said in one line on standard error, with exit code 1.
+module frb_driver_command
+    use frb_init_files, only: init_values, read_init_file
+    use frb_out_files, only: out_file
+    use frb_version, only: version
+    use, intrinsic :: iso_c_binding, only: c_int
+    use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
+    implicit none
+    private
+
+    public :: begin_run, fail, fail_run
+
+    !> What each program computes, and what a record of its output holds.
+    character(*), parameter :: purposes(0:4) = [character(80) :: &
+        'the motion of a free rigid body, one step of size h, attitude a matrix', &
+        'a heavy top, a sixth-order splitting around the free rigid body', &
+        'the motion of a free rigid body, one step of size h, attitude a quaternion', &
+        'the motion of a free rigid body in N steps, attitude a matrix', &
+        'the motion of a free rigid body in N steps, attitude a quaternion']
+    character(*), parameter :: records(0:4) = [character(80) :: &
+        'm(3), Q(9) column by column, t; at the start and at the end', &
+        'm(3), Q(9) column by column, t; at the start and after every step', &
+        'm(3), q(4) scalar first, t; at the start and at the end', &
+        'm(3), Q(9) column by column, t; at the start and after every step', &
+        'm(3), q(4) scalar first, t; at the start and after every step']
+
+    interface
+        !> C: ends the program with an exit code and, unlike `stop`, without a word.
+        subroutine c_exit(code) bind(c, name='exit')
+            import :: c_int
+            integer(c_int), value :: code
+        end subroutine c_exit
+    end interface
+
+contains
+
+    !> Reads the command line and the init file, and opens the output. Comes back only if a run is to be made.
+    subroutine begin_run(example, values, out)
+        integer, intent(in) :: example              !! 0 to 4
+        type(init_values), intent(out) :: values
+        type(out_file), intent(inout) :: out
+        character(:), allocatable :: init_path, out_path, error
+
+        call read_command_line(example, init_path, out_path)
+        if (init_path == out_path) call fail(init_path//': is the input, it cannot be the output too')
+        call read_init_file(init_path, example, values, error)
+        if (allocated(error)) call fail(error)
+        call out%open_for_writing(out_path, error)
+        if (allocated(error)) call fail(error)
+    end subroutine begin_run
+
+    !> Ends the program: one line on standard error, exit code 1.
+    subroutine fail(message)
+        character(*), intent(in) :: message
+
+        call finish(error_unit, 'error: '//message, 1)
+    end subroutine fail
+
+    !> Ends a run that cannot go on, and removes what it wrote.
+    subroutine fail_run(out, message)
+        type(out_file), intent(inout) :: out
+        character(*), intent(in) :: message
+
+        call out%discard()
+        call fail(message)
+    end subroutine fail_run
+
+    !> Paths of the init file and of the output, from the arguments or by default.
+    subroutine read_command_line(example, init_path, out_path)
+        integer, intent(in) :: example
+        character(:), allocatable, intent(out) :: init_path, out_path
+        character(:), allocatable :: word
+        character :: digit
+        logical :: options
+        integer :: i
+
+        digit = achar(iachar('0') + example)
+        options = .true.
+        init_path = ''
+        out_path = ''
+        i = 0
+        do while (i < command_argument_count())
+            i = i + 1
+            word = argument(i)
+            if (options .and. word == '--') then
+                options = .false.
+            else if (options .and. (word == '--help' .or. word == '-h')) then
+                call finish(output_unit, help(example), 0)
+            else if (options .and. word == '--version') then
+                call finish(output_unit, 'driver_example'//digit//' (frb) '//version, 0)
+            else if (options .and. word == '-o') then
+                i = i + 1
+                if (i > command_argument_count()) call fail('-o needs the name of a file (see --help)')
+                if (len(out_path) > 0) call fail('more than one -o (see --help)')
+                out_path = argument(i)
+                if (len_trim(out_path) == 0) call fail('-o needs the name of a file (see --help)')
+            else if (options .and. index(word, '-') == 1) then
+                call fail('unknown option '//word//' (see --help)')
+            else if (len(init_path) > 0) then
+                call fail('more than one init file: '//word//' (see --help)')
+            else if (len_trim(word) == 0) then
+                call fail('the name of the init file is empty (see --help)')
+            else
+                init_path = word
+            end if
+        end do
+        if (len(init_path) == 0) init_path = 'data/init_example'//digit//'.dat'
+        if (len(out_path) == 0) out_path = 'out_example'//digit//'.dat'
+    end subroutine read_command_line
+
+    !> One argument of the command line.
+    function argument(i) result(word)
+        integer, intent(in) :: i
+        character(:), allocatable :: word
+        integer :: length
+
+        call get_command_argument(i, length=length)
+        allocate (character(length) :: word)
+        if (length > 0) call get_command_argument(i, word)
+    end function argument
+
+    !> The text of --help.
+    pure function help(example) result(text)
+        integer, intent(in) :: example
+        character(:), allocatable :: text
+        character(*), parameter :: nl = new_line('a')
+        character :: digit
+
+        digit = achar(iachar('0') + example)
+        text = 'usage: driver_example'//digit//' [INIT] [-o OUT]'//nl// &
+               'Computes '//trim(purposes(example))//'.'//nl//nl// &
+               '  INIT       input, data/init_example'//digit// &
+                           '.dat by default; data/README.md has the format'//nl// &
+               '  -o OUT     output, out_example'//digit//'.dat by default; one record a line:'//nl// &
+               '             '//trim(records(example))//nl// &
+               '  --help     this text'//nl// &
+               '  --version  name and version'
+    end function help
+
+    !> Ends the program with a text and an exit code.
+    subroutine finish(unit, text, code)
+        integer, intent(in) :: unit
+        character(*), intent(in) :: text
+        integer, intent(in) :: code
+
+        write (unit, '(a)') text
+        flush (unit)
+        call c_exit(int(code, c_int))
+    end subroutine finish
+
+end module frb_driver_command

@@ -1,0 +1,204 @@
+!> What a driver tells about its run: progress while it lasts, and a summary of its cost and of how well
+!> the constants of the motion were kept.
+module frb_driver_watch
+    use frb_kinds, only: wp
+    use frb_out_files, only: out_file
+    use frb_rotations, only: cross, norm3, quat_rotate
+    use, intrinsic :: iso_c_binding, only: c_int
+    use, intrinsic :: iso_fortran_env, only: error_unit, output_unit, int64
+    implicit none
+    private
+
+    public :: run_watch
+
+    !> Largest departures from the first record so far, and the time spent.
+    type :: run_watch
+        integer, private :: steps = 0               !! of the whole run
+        integer, private :: done = 0
+        integer(int64), private :: ticks = 0        !! spent in steps
+        integer(int64), private :: step_begun = 0, run_begun = 0, last_shown = 0
+        logical, private :: shows_progress = .false.
+        real(wp), private :: norm0 = 0.0_wp, space0(3) = 0.0_wp, energy0 = 0.0_wp, energy_scale = 1.0_wp
+        real(wp), private :: norm_drift = 0.0_wp, space_drift = 0.0_wp, defect = 0.0_wp
+        real(wp), private :: energy_drift(2) = 0.0_wp   !! in the first and in the second half of the run
+        logical, private :: torque = .false.
+        real(wp), private :: up(3) = 0.0_wp, vertical_drift = 0.0_wp
+    contains
+        procedure :: begin
+        procedure :: begin_step
+        procedure :: end_step
+        procedure :: report
+        procedure, private :: see
+        procedure, private :: see_matrix
+        procedure, private :: see_quaternion
+        generic :: note => see_matrix, see_quaternion
+        procedure, private :: show_progress
+    end type run_watch
+
+    interface
+        !> POSIX: 1 if a file descriptor is a terminal.
+        function c_isatty(descriptor) bind(c, name='isatty') result(terminal)
+            import :: c_int
+            integer(c_int), value :: descriptor
+            integer(c_int) :: terminal
+        end function c_isatty
+    end interface
+
+contains
+
+    !> Starts the watch over a run of so many steps. With `u0`, gravity in space, the run is a heavy top's:
+    !> the energy is then T + u0.(Q e3), and of Q m only the part along u0 is a constant.
+    subroutine begin(self, steps, u0)
+        class(run_watch), intent(inout) :: self
+        integer, intent(in) :: steps
+        real(wp), intent(in), optional :: u0(3)
+
+        self%steps = steps
+        self%done = 0
+        self%torque = present(u0)
+        if (present(u0)) self%up = u0
+        self%shows_progress = c_isatty(2_c_int) == 1_c_int
+        call system_clock(self%run_begun)
+        self%last_shown = self%run_begun
+    end subroutine begin
+
+    !> Call before a step.
+    subroutine begin_step(self)
+        class(run_watch), intent(inout) :: self
+
+        call system_clock(self%step_begun)
+    end subroutine begin_step
+
+    !> Call after a step; shows progress about once a second if standard error is a terminal.
+    subroutine end_step(self)
+        class(run_watch), intent(inout) :: self
+        integer(int64) :: now
+
+        call system_clock(now)
+        self%ticks = self%ticks + (now - self%step_begun)
+        self%done = self%done + 1
+        if (self%shows_progress) call self%show_progress(now)
+    end subroutine end_step
+
+    !> Takes in a record with the attitude as a matrix.
+    subroutine see_matrix(self, m, attitude, moments)
+        class(run_watch), intent(inout) :: self
+        real(wp), intent(in) :: m(3), attitude(3, 3), moments(3)
+        real(wp) :: square(3, 3)
+        integer :: i
+
+        square = matmul(transpose(attitude), attitude)
+        do i = 1, 3
+            square(i, i) = square(i, i) - 1
+        end do
+        call self%see(m, matmul(attitude, m), moments, attitude(:, 3), maxval(abs(square)))
+    end subroutine see_matrix
+
+    !> Takes in a record with the attitude as a quaternion.
+    subroutine see_quaternion(self, m, q, moments)
+        class(run_watch), intent(inout) :: self
+        real(wp), intent(in) :: m(3), q(4), moments(3)
+
+        call self%see(m, quat_rotate(q, m), moments, [0.0_wp, 0.0_wp, 0.0_wp], abs(norm2(q) - 1))
+    end subroutine see_quaternion
+
+    !> Compares a record with the first one.
+    subroutine see(self, m, space, moments, axis, defect)
+        class(run_watch), intent(inout) :: self
+        real(wp), intent(in) :: m(3), moments(3)
+        real(wp), intent(in) :: space(3)    !! Q m
+        real(wp), intent(in) :: axis(3)     !! Q e3
+        real(wp), intent(in) :: defect      !! distance of the attitude from orthogonal, or from norm one
+        real(wp) :: kinetic, potential
+        integer :: half
+
+        kinetic = sum(m*(m/moments))/2
+        potential = 0.0_wp
+        if (self%torque) potential = dot_product(self%up, axis)
+        if (self%done == 0) then
+            self%norm0 = norm3(m)
+            self%space0 = space
+            self%energy0 = kinetic + potential
+            self%energy_scale = kinetic + abs(potential)
+        end if
+        self%norm_drift = max(self%norm_drift, abs(norm3(m) - self%norm0))
+        self%space_drift = max(self%space_drift, norm3(space - self%space0))
+        if (self%torque) &
+            self%vertical_drift = max(self%vertical_drift, abs(dot_product(self%up, space - self%space0)))
+        half = merge(1, 2, self%done <= self%steps/2)
+        self%energy_drift(half) = max(self%energy_drift(half), abs(kinetic + potential - self%energy0))
+        self%defect = max(self%defect, defect)
+    end subroutine see
+
+    !> Writes the summary to standard output.
+    subroutine report(self, title, h, out)
+        class(run_watch), intent(inout) :: self
+        character(*), intent(in) :: title
+        real(wp), intent(in) :: h
+        type(out_file), intent(in) :: out
+        integer(int64) :: now, rate
+        real(wp) :: size_of_m, size_of_up
+
+        call system_clock(now, rate)
+        if (self%last_shown > self%run_begun) write (error_unit, '(a)') achar(13)//'steps done: all        '
+        size_of_m = positive(self%norm0)
+        write (output_unit, '(a)') title
+        write (output_unit, '(a,i0,a,g0.6)') '  steps                      ', self%steps, ' of h = ', h
+        write (output_unit, '(a,es10.3,a)') '  time per step              ', &
+            real(self%ticks, wp)/real(rate, wp)/max(1, self%done), ' s'
+        write (output_unit, '(a,es10.3,a)') '  time of the run            ', &
+            real(now - self%run_begun, wp)/real(rate, wp), ' s, with writing'
+        write (output_unit, '(a)') '  largest change over the run, relative:'
+        if (self%torque) then
+            size_of_up = positive(norm3(self%up))
+            call line('|m| (turned by torque)', self%norm_drift/size_of_m)
+            call line('Q m (turned by torque)', self%space_drift/size_of_m)
+            call line('Q m along u0', self%vertical_drift/size_of_up/size_of_m)
+            call line('energy, first half', self%energy_drift(1)/positive(self%energy_scale))
+            call line('energy, second half', self%energy_drift(2)/positive(self%energy_scale))
+        else
+            call line('|m|', self%norm_drift/size_of_m)
+            call line('Q m', self%space_drift/size_of_m)
+            call line('energy', maxval(self%energy_drift)/positive(self%energy_scale))
+        end if
+        write (output_unit, '(a,es10.3)') '  attitude off orthogonal by ', self%defect
+        write (output_unit, '(a)') '  written to                 '//out%path
+
+    contains
+
+        !> One line of the summary.
+        subroutine line(name, value)
+            character(*), intent(in) :: name
+            real(wp), intent(in) :: value
+            character(25) :: padded
+
+            padded = name
+            write (output_unit, '(a,es10.3)') '    '//padded//'', value
+        end subroutine line
+
+    end subroutine report
+
+    !> A scale to divide by: one in the place of nothing.
+    pure function positive(scale)
+        real(wp), intent(in) :: scale
+        real(wp) :: positive
+
+        positive = merge(scale, 1.0_wp, scale > tiny(1.0_wp))
+    end function positive
+
+    !> Shows how far the run is, about once a second.
+    subroutine show_progress(self, now)
+        class(run_watch), intent(inout) :: self
+        integer(int64), intent(in) :: now
+        integer(int64) :: rate, unused
+
+        if (self%done == self%steps) return
+        call system_clock(unused, rate)
+        if (now - self%last_shown < rate) return
+        self%last_shown = now
+        write (error_unit, '(a,i0,a,i0)', advance='no') achar(13)//'steps done: ', self%done, ' of ', &
+                    self%steps
+        flush (error_unit)
+    end subroutine show_progress
+
+end module frb_driver_watch
