@@ -28,14 +28,14 @@ contains
         allocate (methods, source=catalogue())
         allocate (steps, source=[(10.0_wp**(merge(k/1.0_wp, k/3.0_wp, options%quick) - 3), &
                                   k=0, merge(4, 12, options%quick))])
-        repetitions = merge(5, 15, options%quick)
+        repetitions = merge(5, 31, options%quick)
         allocate (works(size(methods)), ns(size(methods), repetitions), table(7, size(methods), size(steps)))
         do k = 1, size(steps)
             do i = 1, size(methods)
                 works(i) = new_workload(methods(i), moments, start, steps(k), &
                                         merge(1000, 1, methods(i)%family == family_batch))
             end do
-            call time_in_turn(options, 'cost', works, merge(1.0e-3_wp, 4.0e-3_wp, options%quick), .false., ns)
+            call time_in_turn(options, 'cost', works, merge(1.0e-3_wp, 2.0e-3_wp, options%quick), .false., ns)
             call summarise(methods, ns, table(:, :, k))
             table(1, :, k) = steps(k)
         end do

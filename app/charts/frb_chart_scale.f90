@@ -30,14 +30,14 @@ contains
         two = threads_there() > 1
         if (.not. two) call say('  one thread only: build with --flag "-fopenmp" for two')
         counts = merge(6, 8, options%quick)
-        repetitions = merge(5, 9, options%quick)
+        repetitions = merge(5, 7, options%quick)
         allocate (ns(repetitions, curves, counts), steps(curves))
         ns = 0.0_wp
         do k = 1, counts
             n = 10**(k - 1)
             work = new_workload(find_method('flow'), moments, m0, h, n)
             do i = 1, curves
-                if (threads(i) > 1 .and. .not. two) cycle
+                if (threads(i) > 1 .and. (.not. two .or. n < 1000)) cycle
                 call set(i)
                 work%nsteps = 1
                 do
@@ -48,7 +48,7 @@ contains
             end do
             do r = 1, repetitions
                 do i = 1, curves
-                    if (threads(i) > 1 .and. .not. two) cycle
+                    if (threads(i) > 1 .and. (.not. two .or. n < 1000)) cycle
                     call set(i)
                     work%nsteps = steps(i)
                     ns(r, i, k) = 1.0e9_wp*run(work)/(real(steps(i), wp)*n)
@@ -62,7 +62,7 @@ contains
         do i = 1, curves
             write (unit, '(a,i0,a)') '# method: '//trim(keys(i))//', ', threads(i), ' thread(s)'
             do k = 1, counts
-                if (threads(i) > 1 .and. .not. two) then
+                if (threads(i) > 1 .and. (.not. two .or. k <= 3)) then
                     if (k == 1) write (unit, '(a)') 'NaN NaN NaN NaN'
                     cycle
                 end if

@@ -6,9 +6,9 @@ module frb_chart_top
         status_ok
     use frb_chart_methods, only: method, find_method, known, advance_once, family_dmv
     use frb_chart_output, only: settings, open_table, open_script, draw, progress, either, quantile
+    use frb_chart_timing, only: clock
     use frb_dmv, only: dmv_body, new_dmv_body, dmv_steps
     use frb_top_truth, only: qp, taylor_top
-    use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
@@ -161,7 +161,7 @@ contains
         type(splitting_scheme) :: scheme
         type(heavy_top) :: scene
         type(rigid_body) :: body
-        integer(int64) :: start, finish, rate
+        real(wp) :: start
         integer :: pass, stat
 
         body = rigid_body(moments)
@@ -169,7 +169,7 @@ contains
         scene%force = u0
         drift%with = find_method(trim(pair%drift))
         drift%rival = new_dmv_body(moments)
-        call system_clock(start, rate)
+        start = clock(1)
         do pass = 1, rounds
             m = m0
             q = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
@@ -179,8 +179,7 @@ contains
                 call integrate(body, scheme, scene, duration/steps, steps, m, q, drift=drift, stat=stat)
             end if
         end do
-        call system_clock(finish)
-        seconds = real(finish - start, wp)/real(rate, wp)
+        seconds = clock(1) - start
         if (stat /= status_ok) q = 1.0_wp
     end subroutine run
 
