@@ -109,8 +109,8 @@ contains
         type(settings), intent(in) :: options
         character(*), parameter :: names(*) = [character(12) :: 'dmv2', 'dmv4', 'dmv6', 'dmv8', 'dmv10', &
             'flow', &
-            'flow-m', 'flow-batch', 'flow-batch', 'flow-m', 'dmv2', 'dmv10', 'flow']
-        integer, parameter :: bodies(*) = [1, 1, 1, 1, 1, 1, 1, 1000, 1000000, 1000, 1000, 1000, 1000]
+            'flow-m', 'flow-batch', 'flow-batch', 'flow-m', 'dmv2', 'dmv10', 'flow', 'frb_step', 'quat_step']
+        integer, parameter :: bodies(*) = [1, 1, 1, 1, 1, 1, 1, 1000, 1000000, 1000, 1000, 1000, 1000, 1, 1]
         real(wp), parameter :: steps(*) = [0.001_wp, 0.003_wp, 0.01_wp, 0.03_wp, 0.1_wp, 0.3_wp, 1.0_wp, &
             3.0_wp, 10.0_wp]
         type(workload), allocatable :: works(:)
@@ -129,19 +129,25 @@ contains
             'ratios of times per body and step: the median over the repetitions', &
             'h*omega, dmv2 [ns], dmv10 [ns], free flow [ns], flow/dmv10, flow/dmv2, momentum only/dmv10, '// &
             'batch of 1000/cheapest dmv, batch of 1e6/cheapest dmv, batch of 1000/dmv2 over 1000 bodies, '// &
-            'scalar flow over 1000 bodies/dmv10 over 1000 bodies', unit)
-        call say('h omega   dmv2  dmv10   flow  [ns] flow/dmv10 flow/dmv2 m/dmv10 b1000/dmv b1e6/dmv '// &
-                 'b1000/dmv2-1000 flow/dmv10-1000')
+            'scalar flow over 1000 bodies/dmv10 over 1000 bodies, frb_step/flow, quat_step/flow', unit)
+        call say('ratios; "1000" and "1e6": so many bodies; dmv: the cheapest order for one body')
+        call say(' h omega   dmv2  dmv10   flow flow/dmv10 flow/dmv2  m/dmv10  1000/dmv   1e6/dmv  '// &
+            '1000/1000  '// &
+                 '1000/1000  frb_step quat_step')
+        call say('             ns     ns     ns                                batch/    batch/   '// &
+            'batch/dmv2 '// &
+                 'flow/dmv10    /flow     /flow')
         do k = 1, size(steps), every
             works%h = steps(k)
             works%nsteps = 1
             call time_in_turn(options, 'speed', works, 2.0e-3_wp, .false., ns)
             associate (dmv2 => ns(1, :), dmv10 => ns(5, :), flow => ns(6, :), cheapest => minval(ns(1:5, &
                 :), dim=1))
-                write (line, '(es9.1,3f7.1,7f10.3)') steps(k), middle(dmv2), middle(dmv10), middle(flow), &
+                write (line, '(es9.1,3f7.1,9f10.3)') steps(k), middle(dmv2), middle(dmv10), middle(flow), &
                     middle(flow/dmv10), middle(flow/dmv2), middle(ns(7, :)/dmv10), middle(ns(8, &
                     :)/cheapest), &
-                    middle(ns(9, :)/cheapest), middle(ns(8, :)/ns(11, :)), middle(ns(13, :)/ns(12, :))
+                    middle(ns(9, :)/cheapest), middle(ns(8, :)/ns(11, :)), middle(ns(13, :)/ns(12, :)), &
+                    middle(ns(14, :)/flow), middle(ns(15, :)/flow)
             end associate
             write (unit, '(a)') trim(line)
             call say(trim(line))

@@ -195,7 +195,7 @@ contains
         type(method), intent(in) :: methods(:)
         character(*), parameter :: shown(*) = [character(12) :: 'rk4', 'rotations4', 'dmv2', 'dmv10', &
             'dp-15', &
-            'quat_step-2', 'frb_step-10', 'quat_step-f3', 'quat_step-f2', 'quat_step', 'frb_step', &
+            'quat_step-3', 'quat_step-10', 'quat_step-f3', 'quat_step-f2', 'quat_step', 'frb_step', &
             'flow-batch', 'flow']
         integer :: unit, p, i, j, entries
 

@@ -1,6 +1,6 @@
 !> The catalogue of methods the charts compare, and the one routine that advances a body by any of them.
 module frb_chart_methods
-    use frb, only: wp, rigid_body, free_flow, status_ok, quat_to_matrix, matrix_to_quat
+    use frb, only: wp, rigid_body, free_flow, frb_step, quat_step, status_ok, quat_to_matrix, matrix_to_quat
     use frb_dmv, only: dmv_body, new_dmv_body, dmv_steps
     use frb_rotation_splitting, only: rotation_steps
     use frb_runge_kutta, only: rk4_steps, dormand_prince
@@ -9,7 +9,7 @@ module frb_chart_methods
     implicit none
     private
 
-    public :: method, catalogue, find_method, known, style, advance, advance_once
+    public :: method, catalogue, find_method, known, style, escaped, advance, advance_once
     public :: family_flow, family_batch, family_momentum, family_matrix, family_paper_q, family_paper_a
     public :: family_dmv, family_rotations, family_rk4, family_dp
 
@@ -44,6 +44,7 @@ contains
     function catalogue() result(methods)
         type(method), allocatable :: methods(:)
         character(4) :: digits
+        integer, parameter :: gauss(*) = [1, 2, 3, 5, 10]
         integer :: i
 
         ! Colours: the free flow vermilion, the paper's exact steps green, its semi-exact ones purple,
@@ -54,6 +55,20 @@ contains
         call add('flow-batch', 'free flow, batch', family_batch, 0, 0, 2, 2, 5, 3)
         call add('flow-m', 'free flow, momentum only', family_momentum, 0, 0, 2, 3, 9, 2)
         call add('flow-a', 'free flow, matrix', family_matrix, 0, 0, 2, 4, 11, 2)
+        call add('quat_step', 'quat_step', family_paper_q, 1, 0, 4, 1, 9, 2)
+        call add('quat_step-f2', 'quat_step, frame 2', family_paper_q, 2, 0, 4, 2, 11, 2)
+        call add('quat_step-f3', 'quat_step, frame 3', family_paper_q, 3, 0, 4, 3, 13, 2)
+        call add('frb_step', 'frb_step', family_paper_a, 0, 0, 4, 4, 5, 2)
+        do i = 1, size(gauss)
+            write (digits, '(i0)') gauss(i)
+            call add('quat_step-'//digits, 'quat_step, np = '//digits, family_paper_q, 1, gauss(i), 5, &
+                     merge(1, 2, gauss(i) > 2), i + 1, 2)
+        end do
+        do i = 1, size(gauss)
+            write (digits, '(i0)') gauss(i)
+            call add('frb_step-'//digits, 'frb_step, np = '//digits, family_paper_a, 0, gauss(i), 5, 3, &
+                i + 1, 2)
+        end do
         do i = 2, 10, 2
             write (digits, '(i0)') i
             call add('dmv'//digits, 'Moser-Veselov '//digits, family_dmv, i, 0, merge(3, 7, i == 2 &
@@ -139,9 +154,23 @@ contains
         if (present(label)) then
             clause = trim(text)//' title "'//label//'"'
         else
-            clause = trim(text)//' title "'//trim(with%label)//'"'
+            clause = trim(text)//' title "'//escaped(with%label)//'"'
         end if
     end function style
+
+    !> Text for gnuplot, which takes an underscore for the start of a subscript.
+    pure function escaped(text) result(safe)
+        character(*), intent(in) :: text
+        character(:), allocatable :: safe
+        integer :: i
+
+        safe = ''
+        do i = 1, len_trim(text)
+            ! Two backslashes: one is taken by gnuplot's double quotes.
+            if (text(i:i) == '_') safe = safe//'\\'
+            safe = safe//text(i:i)
+        end do
+    end function escaped
 
     !> Takes `nsteps` steps of h; body constants are set up once. NaN when the method refuses.
     !> The batch form advances as many copies of the body as there are columns in a small block and returns
@@ -186,8 +215,24 @@ contains
             m = many_m(:, copies)
             q = many_q(:, copies)
         case (family_matrix)
+            body = rigid_body(moments)
             matrix = quat_to_matrix(q)
-            call advance_matrix(with, moments, h, nsteps, m, matrix, stat)
+            do i = 1, nsteps
+                call free_flow(body, h, m, matrix, stat)
+                if (stat /= status_ok) exit
+            end do
+            q = matrix_to_quat(matrix)
+        case (family_paper_q)
+            do i = 1, nsteps
+                call quat_step(m, q, h, moments, m, q, with%points, with%option, stat)
+                if (stat /= status_ok) exit
+            end do
+        case (family_paper_a)
+            matrix = quat_to_matrix(q)
+            do i = 1, nsteps
+                call frb_step(m, matrix, h, moments, m, matrix, with%points, stat)
+                if (stat /= status_ok) exit
+            end do
             q = matrix_to_quat(matrix)
         case (family_dmv)
             call dmv_steps(new_dmv_body(moments), with%option, h, nsteps, m, q)
@@ -224,25 +269,5 @@ contains
         stat = status_ok
         call advance(with, moments, h, 1, m, q)
     end subroutine advance_once
-
-    !> The methods that carry the attitude as a matrix.
-    subroutine advance_matrix(with, moments, h, nsteps, m, a, stat)
-        type(method), intent(in) :: with
-        real(wp), intent(in) :: moments(3), h
-        integer, intent(in) :: nsteps
-        real(wp), intent(inout) :: m(3), a(3, 3)
-        integer, intent(out) :: stat
-        type(rigid_body) :: body
-        integer :: i
-
-        stat = status_ok
-        if (with%family == family_matrix) then
-            body = rigid_body(moments)
-            do i = 1, nsteps
-                call free_flow(body, h, m, a, stat)
-                if (stat /= status_ok) exit
-            end do
-        end if
-    end subroutine advance_matrix
 
 end module frb_chart_methods

@@ -3,7 +3,7 @@
 module frb_chart_precision
     use frb, only: wp
     use frb_chart_methods, only: method, catalogue, style, family_flow, family_batch, family_momentum, &
-        family_matrix, family_dp
+        family_matrix, family_dp, family_paper_a, family_paper_q
     use frb_chart_output, only: settings, open_table, open_script, draw, progress, either, &
         quantile, uniform, random_direction
     use frb_chart_timing, only: workload, new_workload, time_in_turn
@@ -76,6 +76,16 @@ contains
             end if
         end do
     end function curves
+
+    !> The methods that are drawn; the others, which lie on top of these, are in the tables.
+    elemental function drawn(with) result(yes)
+        type(method), intent(in) :: with
+        logical :: yes
+
+        yes = .true.
+        if (with%family == family_paper_a) yes = with%points == 0
+        if (with%family == family_paper_q) yes = with%option == 1
+    end function drawn
 
     !> Times and errors of every method at every number of steps.
     subroutine measure(options, methods, item, points, counts)
@@ -195,6 +205,7 @@ contains
             write (unit, '(a,i0,a)') '  "work-precision-'//trim(names(b))//'.dat" index ', size(methods), &
                 ' using 1:2 with steps lc rgb "#dddddd" lw 10 notitle, \'
             do i = size(methods), 1, -1
+                if (.not. drawn(methods(i))) cycle
                 write (unit, '(a,i0,a)') '  "work-precision-'//trim(names(b))//'.dat" index ', i - 1, &
                     ' using 2:5'//style(methods(i), '')//either(i == 1, '', ', \')
             end do
@@ -206,6 +217,7 @@ contains
             'set key center center maxrows 12 samplen 2.2 spacing 1.1 Left reverse', 'plot \', &
             '  NaN with lines lc rgb "#dddddd" lw 10 title "lower left envelope", \'
         do i = 1, size(methods)
+            if (.not. drawn(methods(i))) cycle
             write (unit, '(a)') '  NaN'//style(methods(i))//either(i == size(methods), '', ', \')
         end do
         write (unit, '(a)') 'unset multiplot'
@@ -272,7 +284,8 @@ contains
         k = 0
         do i = 1, size(methods)
             if (methods(i)%family == family_dp) cycle
-            write (unit, '(a,i0,a)') '  "growth.dat" index ', k, ' using 1:2'//style(methods(i))//', \'
+            if (drawn(methods(i))) write (unit, '(a,i0,a)') '  "growth.dat" index ', k, ' using 1:2'// &
+                style(methods(i))//', \'
             k = k + 1
         end do
         write (unit, '(a)') '  NaN notitle'

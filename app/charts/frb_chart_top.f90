@@ -4,7 +4,7 @@
 module frb_chart_top
     use frb, only: wp, rigid_body, splitting_scheme, heavy_top, body_drift, body_observer, integrate, &
         status_ok
-    use frb_chart_methods, only: method, find_method, known, advance_once, family_dmv
+    use frb_chart_methods, only: method, find_method, known, escaped, advance_once, family_dmv
     use frb_chart_output, only: settings, open_table, open_script, draw, progress, either, quantile
     use frb_chart_timing, only: clock
     use frb_dmv, only: dmv_body, new_dmv_body, dmv_steps
@@ -250,17 +250,6 @@ contains
             ' lw ', pair%width, ' ps 0.7'
         clause = trim(text)//' '//title
     end function curve
-
-    !> gnuplot's enhanced text takes an underscore for a subscript.
-    pure function escaped(text) result(safe)
-        character(*), intent(in) :: text
-        character(:), allocatable :: safe
-        integer :: place
-
-        place = index(text, '_')
-        safe = trim(text)
-        if (place > 0) safe = text(:place - 1)//'\\_'//trim(text(place + 1:))
-    end function escaped
 
     !> The momentum of the paper's top over a long time, as a density of points, and a close-up.
     subroutine chart_torus(options)

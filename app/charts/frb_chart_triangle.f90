@@ -1,7 +1,7 @@
 !> The chart `triangle`: the paper's figure 5 made again, errors of one step h = 1 over all shapes of a body.
 module frb_chart_triangle
     use frb, only: wp
-    use frb_chart_methods, only: method, find_method, known
+    use frb_chart_methods, only: method, find_method, known, escaped
     use frb_chart_output, only: settings, open_table, open_script, draw, progress, say, either, &
         random_direction
     use frb_chart_truth, only: free_case, new_case, errors_of
@@ -139,7 +139,7 @@ contains
                 left = 0.075_wp + 0.285_wp*(k - 1)
                 write (unit, '(a,f6.4,a,f6.4)') 'set origin ', left, ',', merge(0.55_wp, 0.11_wp, row == 1)
                 write (unit, '(a)') 'set size 0.25,0.32', &
-                    'set title "'//escaped(trim(methods(k)%label))//', '//trim(which(row))// &
+                    'set title "'//escaped(methods(k)%label)//', '//trim(which(row))// &
                     '" offset 0,-0.6', &
                     either(k == 1, 'set ylabel "I_2/I_3" offset 1,0', 'unset ylabel'), &
                     either(row == 2, 'set xlabel "I_1/I_3" offset 0,0.5', 'unset xlabel')
@@ -151,18 +151,5 @@ contains
         close (unit)
         call draw(options, name)
     end subroutine draw_triangle
-
-    !> gnuplot's enhanced text takes an underscore for a subscript.
-    pure function escaped(text) result(safe)
-        character(*), intent(in) :: text
-        character(:), allocatable :: safe
-        integer :: i
-
-        safe = ''
-        do i = 1, len(text)
-            if (text(i:i) == '_') safe = safe//'\'
-            safe = safe//text(i:i)
-        end do
-    end function escaped
 
 end module frb_chart_triangle
