@@ -6,7 +6,7 @@ module frb_test_splitting
     use frb_invariants, only: invariant_monitor, kinetic_energy, norm_defect, spatial_momentum, total_energy
     use frb_kinds, only: wp
     use frb_scenes, only: heavy_top, plain_scene
-    use frb_schemes, only: splitting_scheme
+    use frb_schemes, only: splitting_scheme, scheme_names
     use frb_splitting, only: integrate
     use frb_status, only: status_ok, status_bad_attitude, status_bad_count, status_bad_moments, &
         status_bad_momentum, status_bad_option, status_bad_scheme, status_bad_time, status_bad_torque
@@ -25,11 +25,12 @@ contains
     subroutine test_splitting(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('splitting', 108)
+        call t%open_suite('splitting', 131)
         call test_values(t)
         call test_orders(t)
         call test_long_run(t)
         call test_invariants(t)
+        call test_compensated(t)
         call test_loop(t)
         call test_refused(t)
         call t%close_suite()
@@ -237,6 +238,56 @@ contains
         call t%ok('energy-without-a-potential-is-nan', &
                   ieee_is_nan(total_energy(item%body, no_potential, 0.0_wp, item%m0, item%q0)))
     end subroutine test_invariants
+
+    !> Compensated runs: rounding errors are carried over, so none of them accumulate.
+    subroutine test_compensated(t)
+        type(tally), intent(inout) :: t
+        type(top_case) :: item
+        type(splitting_scheme) :: scheme
+        type(invariant_monitor) :: monitor
+        type(recorder) :: seen
+        type(plain_drift) :: drift
+        real(wp) :: m(3), q(4), m_seen(3), q_seen(4)
+        integer :: i, k
+
+        do k = 2, 3
+            item = known_top(k)
+            do i = 1, size(scheme_names)
+                scheme = splitting_scheme(trim(scheme_names(i)))
+                m = item%m0
+                q = item%q0
+                call integrate(item%body, scheme, item%top, 0.01_wp, 10000, m, q, compensated=.true.)
+                call integrate(item%body, scheme, item%top, -0.01_wp, 10000, m, q, compensated=.true.)
+                call t%at_most('compensated-10000-longer-steps-there-and-back-return-the-start', &
+                               distance(m, q, item%m0, item%q0), 1.0e-12_wp)
+            end do
+        end do
+
+        scheme = splitting_scheme('srkn14')
+        monitor%body = item%body
+        allocate (monitor%scene, source=item%top)
+        m = item%m0
+        q = item%q0
+        call integrate(item%body, scheme, item%top, 0.01_wp, 20000, m, q, monitor, compensated=.true.)
+        call t%at_most('compensated-energy-does-not-wander', monitor%energy_error, 32*eps)
+        call t%at_most('compensated-momentum-does-not-wander', monitor%momentum_error, 32*eps)
+        call t%at_most('compensated-norm-does-not-wander', monitor%norm_error, 4*eps)
+
+        do k = 1, 3
+            item = known_top(k)
+            m = item%m0
+            q = item%q0
+            call integrate(item%body, scheme, item%top, item%t/2000, 2000, m, q, compensated=.true.)
+            call t%at_most('compensated-top-ends-where-the-taylor-series-does', &
+                           distance(m, q, item%m, item%q), 32*eps)
+            m_seen = item%m0
+            q_seen = item%q0
+            call integrate(item%body, scheme, item%top, item%t/2000, 2000, m_seen, q_seen, seen, every=500, &
+                           drift=drift, compensated=.true.)
+            call t%at_most('watching-a-compensated-run-does-not-change-it', &
+                           distance(m_seen, q_seen, m, q), 0.0_wp)
+        end do
+    end subroutine test_compensated
 
     !> Observers, merged stages, plain scenes, drifts.
     subroutine test_loop(t)
