@@ -6,6 +6,7 @@ program check
     use frb_test_base, only: test_base
     use frb_test_steps, only: test_steps
     use frb_test_ode45, only: test_ode45
+    use frb_test_step_laws, only: test_step_laws
     use frb_test_rivals, only: test_rivals
     use frb_test_files, only: test_files
     use frb_test_carlson, only: test_carlson
@@ -23,6 +24,7 @@ program check
     call test_base(t)
     call test_steps(t)
     call test_ode45(t)
+    call test_step_laws(t)
     call test_rivals(t)
     call test_files(t)
     call test_carlson(t)

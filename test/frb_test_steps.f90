@@ -87,24 +87,28 @@ contains
         real(wp), intent(in) :: scores(:), bound
 
         ! one check for both: the largest of median/bound and maximum/bound
-        call t%at_most(name//'-is-within-its-units', max(median(scores)/median_score, maxval(scores)/bound), 1.0_wp)
+        call t%at_most(name//'-is-within-its-units', &
+                       max(median(scores)/median_score, maxval(scores)/bound), 1.0_wp)
     end subroutine check_scores
 
     !> Published end values (30-digit Taylor series): free bodies of Hairer and Vilmart, tennis racket.
     subroutine check_published_ends(t)
         type(tally), intent(inout) :: t
 
-        call check_end(t, 'asymmetric-body-at-10', [0.6_wp, 0.8_wp, 1.0_wp], [1.8_wp, 0.4_wp, -0.9_wp], 10.0_wp, &
+        call check_end(t, 'asymmetric-body-at-10', [0.6_wp, 0.8_wp, 1.0_wp], [1.8_wp, 0.4_wp, -0.9_wp], &
+                       10.0_wp, &
                        [1.765962508518207535727150482_wp, -0.6954641970330891194994927568_wp, &
                         0.7795549814818710861007417738_wp], &
                        [-0.7360613641607939361612411474_wp, -0.5707869512403507332546212462_wp, &
                         -0.2993885718307900937437669433_wp, -0.2068390861046731924831171081_wp], 256.0_wp)
-        call check_end(t, 'flat-body-at-10', [0.345_wp, 0.653_wp, 1.0_wp], [1.8_wp, 0.4_wp, -0.9_wp], 10.0_wp, &
+        call check_end(t, 'flat-body-at-10', [0.345_wp, 0.653_wp, 1.0_wp], [1.8_wp, 0.4_wp, -0.9_wp], &
+                       10.0_wp, &
                        [1.805748694153316944124664435_wp, -0.2931590700520223516263628767_wp, &
                         0.9291552148106494226863761060_wp], &
                        [-0.5909531300598776824030520653_wp, 0.7497771466036242986823664977_wp, &
                         -0.2775673505986917899234931261_wp, -0.1075406638671320485487867749_wp], 256.0_wp)
-        call check_end(t, 'tennis-racket-at-100', [3.0_wp, 5.0_wp, 9.0_wp], [0.0_wp, 2.0_wp, 0.01_wp], 100.0_wp, &
+        call check_end(t, 'tennis-racket-at-100', [3.0_wp, 5.0_wp, 9.0_wp], [0.0_wp, 2.0_wp, 0.01_wp], &
+                       100.0_wp, &
                        [0.2090942628297760675113266181_wp, 1.972485481094647073085859142_wp, &
                         0.2562822977158024670448625624_wp], &
                        [0.9729650346542738322786753128_wp, -0.07171372908301691046137617088_wp, &
@@ -157,7 +161,8 @@ contains
         call frb_step(m, a, h, [2.0_wp, 3.0_wp, 6.0_wp], sqrt(0.5_wp)*[1.0_wp, 0.0_wp, 1.0_wp], identity)
         call t%close_to('separatrix-follows-tanh-and-sech', m, &
                         [sqrt(0.5_wp)/cosh(h/6), tanh(h/6), sqrt(0.5_wp)/cosh(h/6)], 2*eps)
-        call frb_step(m, a, 1.0e5_wp, [2.0_wp, 3.0_wp, 6.0_wp], sqrt(0.5_wp)*[1.0_wp, 0.0_wp, 1.0_wp], identity)
+        call frb_step(m, a, 1.0e5_wp, [2.0_wp, 3.0_wp, 6.0_wp], sqrt(0.5_wp)*[1.0_wp, 0.0_wp, 1.0_wp], &
+                      identity)
         call t%close_to('separatrix-ends-at-the-middle-axis', m, [0.0_wp, 1.0_wp, 0.0_wp], 2*eps)
 
         call quat_step(m, q, h, [1.0_wp, 1.0_wp, 2.0_wp], m0, no_turn)
@@ -182,8 +187,8 @@ contains
         real(wp), parameter :: bodies(3, 8) = reshape([ &
             2.0_wp, 3.0_wp, 6.0_wp, 1.0_wp, 1.0_wp, 2.0_wp, 1.0e300_wp, 1.0_wp, 1.0e-300_wp, &
             3.0e-308_wp, 2.5e-308_wp, 4.0e-308_wp, 1.0e308_wp, 1.7e308_wp, 1.5e308_wp, &
-            1.0_wp, 1.0_wp - eps, 1.0_wp + eps, 1.0e-30_wp, 1.0_wp, 1.0_wp + eps, 1.0_wp, 1.1_wp, 1.0e100_wp], &
-            [3, 8])
+            1.0_wp, 1.0_wp - eps, 1.0_wp + eps, 1.0e-30_wp, 1.0_wp, 1.0_wp + eps, &
+            1.0_wp, 1.1_wp, 1.0e100_wp], [3, 8])
         real(wp) :: h, m0(3), m(3), q(4), a(3, 3), defect, change
         integer :: body, i, j, k, l, frame, np
         logical :: finite

@@ -105,7 +105,8 @@ contains
             complete = rj(0.0_wp, motion%kc2, 1.0_wp, last_complete)
             integral = integral + step%half_turns*(factor*((2.0_wp/3)*complete))
         end if
-        if (abs(step%excess) > 0.0_wp) integral = integral + factor*step%excess/last_complete  ! sn = +-1 there
+        ! on the separatrix sn = +-1 from there on
+        if (abs(step%excess) > 0.0_wp) integral = integral + factor*step%excess/last_complete
     end function third_kind
 
     !> psi of (9), or of (16) without f, with the integral of the third kind by np Gauss points, (20).
@@ -129,8 +130,8 @@ contains
                 nc = motion%beta/merge(motion%p, motion%alpha, motion%first_case)
             end if
             along = sign(motion%lambda, merge(m(1), m(3), motion%first_case))
-            psi = constant_rate*motion%time + (rate/along)*eint_gauss(step%phi0, step%phi1, 1 - nc, 0.0_wp, np, &
-                                                                      motion%kc2, nc, stat)
+            psi = eint_gauss(step%phi0, step%phi1, 1 - nc, 0.0_wp, np, motion%kc2, nc, stat)
+            psi = constant_rate*motion%time + (rate/along)*psi
         end associate
     end function quadrature_angle
 

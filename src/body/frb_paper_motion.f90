@@ -11,7 +11,8 @@
 !>     p = 2T - 1/I3 = beta m1**2 + alpha m2**2        r = 1/I1 - 2T = gamma m2**2 + beta m3**2
 !>     delta = 1/I2 - 2T = alpha m3**2 - gamma m1**2   lambda3**2 = gamma p,  lambda1**2 = alpha r,
 !>
-!> delta < 0 is case (i), delta > 0 case (ii), delta = 0 the separatrix (iii), and 1 - k**2 = beta abs(delta)/lambda**2.
+!> delta < 0 is case (i), delta > 0 case (ii), delta = 0 the separatrix (iii), and
+!> 1 - k**2 = beta abs(delta)/lambda**2.
 module frb_paper_motion
     use frb_inertia, only: sorting_order
     use frb_kinds, only: wp
@@ -68,7 +69,7 @@ contains
         real(wp), intent(in) :: momentum(3)         !! body angular momentum, any norm
         type(paper_motion), intent(out) :: motion
         integer, intent(out) :: code                !! `status_ok`, or what is wrong
-        real(wp) :: j1, j2, j3, largest, scaled(3)
+        real(wp) :: j1, j2, j3, largest, scaled(3), excess
 
         ! Finite first: comparing a NaN would raise a floating-point exception.
         code = status_bad_moments
@@ -100,7 +101,10 @@ contains
             scaled = scale(scaled, -motion%shift)
         end if
         motion%norm = sqrt(scaled(1)*scaled(1) + scaled(2)*scaled(2) + scaled(3)*scaled(3))
-        motion%m = scaled/motion%norm
+        scaled = scaled/motion%norm
+        ! the rounding of the norm is the same in every step of a chain, and would add up
+        excess = scaled(1)*scaled(1) + scaled(2)*scaled(2) + scaled(3)*scaled(3) - 1
+        motion%m = scaled - (0.5_wp*excess)*scaled
         motion%time = scaled_time(h, motion%norm, j1, motion%shift)
 
         motion%a2 = j1/j2
@@ -194,7 +198,7 @@ contains
         real(wp), intent(in) :: momentum(3)     !! at the start, in the caller's order
         real(wp), intent(in) :: change(3)       !! sorted, for norm one
         real(wp) :: new(3)
-        real(wp) :: difference(3)
+        real(wp) :: difference(3), limit
         integer :: i
 
         difference = motion%norm*change
@@ -204,7 +208,8 @@ contains
                 new(motion%order(i)) = scale(0.5_wp*momentum(motion%order(i)), -motion%shift) &
                     + 0.5_wp*motion%parity*difference(i)
             end do
-            new = scale(max(min(new, largest_half(motion%shift)), -largest_half(motion%shift)), motion%shift + 1)
+            limit = scale(huge(1.0_wp), -max(motion%shift, 0) - 1)
+            new = scale(max(min(new, limit), -limit), motion%shift + 1)
         else if (motion%sorted) then
             new = momentum + difference
         else
@@ -213,14 +218,6 @@ contains
             end do
         end if
     end function add_momentum
-
-    !> The largest x whose scale(x, shift + 1) is finite.
-    pure function largest_half(shift) result(x)
-        integer, intent(in) :: shift
-        real(wp) :: x
-
-        x = scale(huge(1.0_wp), -max(shift, 0) - 1)
-    end function largest_half
 
     !> Quaternion of a turn by an angle about a unit vector.
     pure function turn_about(axis, angle) result(q)

@@ -27,16 +27,18 @@ contains
     !> Output may be the same variable as input. On the separatrix, about an axis, for two or three equal
     !> moments and for no momentum the formulas of those motions are used.
     !>
-    !> np absent or 0: exact, and qout depends continuously on h. np >= 1: semi-exact, the integral of the third
-    !> kind by np Gauss-Legendre points (order 2 np in h, time-symmetric; |m|, the energy and the momentum in
-    !> space are kept all the same); for a small h only. The turn from qin to qout then has a scalar part >= 0.
+    !> np absent or 0: exact, and qout depends continuously on h. np >= 1: semi-exact, the integral of the
+    !> third kind by np Gauss-Legendre points (order 2 np in h, time-symmetric; |m|, the energy and the
+    !> momentum in space are kept all the same); for a small h only, and not faster than the exact step. The
+    !> turn from qin to qout then has a scalar part >= 0.
     !>
-    !> Accuracy of the exact step, in units of the inherent sensitivity (data/reference): below 4 in every
-    !> group for frame 1, below 6 for frames 2 and 3, unit to 1e-14; checked by steps: reference-cases.
-    !> The sensitivity itself grows near the middle axis and the separatrix: m and q lose about
-    !> log10(1/(1 - k**2)) of their 16 digits once h covers a half turn. The frames have poles, where p turns
-    !> fast: m along -e3 for (1), along any principal axis for (2), along +-e3 for (3). Exact steps lose
-    !> nothing there; with np >= 1 about log10(1/distance) digits are lost, and the order shows for smaller h.
+    !> Accuracy of the exact step, in units of the inherent sensitivity (data/reference): in every group a
+    !> median below 2 and a maximum below 4 for m and for q in frame 1, below 6 in frames 2 and 3; the turn
+    !> from qin to qout is unit to 1e-14 (checked by steps). The sensitivity itself grows near the middle axis
+    !> and the separatrix: once h covers a half turn, m and q lose about log10(1/(1 - k**2)) of 16 digits.
+    !> The frames have poles, where p turns fast: m along -e3 for (1), along any principal axis for (2), along
+    !> +-e3 for (3). Exact steps lose nothing there; semi-exact ones about log10(1/distance) digits, and their
+    !> order shows for smaller h only.
     !>
     !> Errors: status_bad_moments (not positive and finite), status_bad_momentum, status_bad_time,
     !> status_bad_attitude (not finite, or zero), status_bad_count (np < 0 or np > 1000), status_bad_option
@@ -117,9 +119,10 @@ contains
         if (points > 0 .and. turn(1) < 0.0_wp) turn = -turn
     end subroutine elliptic_turn
 
-    !> The quaternion p of a frame: p m p^-1 = e3, (15), with (p0, p3) = (cos(xi/2), sin(xi/2)) sqrt((1 + m3)/2):
-    !> the frame is the one of (1) turned about e3 by xi. The printed formulas for p3**2 and the sign of p0 p3
-    !> are those of sin(xi/2)**2 = (1 - cos(xi))/2 and of sin(xi); forming cos(xi) and sin(xi) keeps the digits.
+    !> The quaternion p of a frame: p m p^-1 = e3, (15), with
+    !> (p0, p3) = (cos(xi/2), sin(xi/2)) sqrt((1 + m3)/2): the frame is that of (1) turned about e3 by xi. The
+    !> printed formulas for p3**2 and the sign of p0 p3 are those of sin(xi/2)**2 = (1 - cos(xi))/2 and of
+    !> sin(xi); forming cos(xi) and sin(xi) keeps the digits.
     pure function frame_quaternion(motion, m, frame) result(p)
         type(paper_motion), intent(in) :: motion
         real(wp), intent(in) :: m(3)
@@ -155,7 +158,7 @@ contains
         end if
     end function frame_quaternion
 
-    !> (cos(xi/2), sin(xi/2)) of the angle xi in [-pi, pi] of the vector (x, y), 0 for no vector; cos(xi/2) >= 0.
+    !> (cos(xi/2), sin(xi/2)) of the angle xi in [-pi, pi] of the vector (x, y), 0 for no vector.
     pure function half_angle(x, y) result(half)
         real(wp), intent(in) :: x, y
         real(wp) :: half(2)
@@ -193,7 +196,7 @@ contains
         end if
         product = quat_product(quat_product(p0, z), quat_conjugate(p))
         scaling = product(1)*product(1) + product(4)*product(4)
-        if (scaling < tiny(1.0_wp)) then    ! a long stay at the middle axis has cost all digits
+        if (scaling < 1.0e-280_wp) then    ! a long stay at the middle axis has cost all digits
             product = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
             scaling = 1.0_wp
         end if

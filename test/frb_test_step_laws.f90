@@ -1,0 +1,364 @@
+!> frb_step and quat_step: the laws any flow of the free rigid body obeys, the semi-exact order, a heavy top.
+module frb_test_step_laws
+    use frb_checks, only: tally
+    use frb_kinds, only: wp
+    use frb_matrix_step, only: frb_step
+    use frb_quat_step, only: quat_step
+    use frb_rotations, only: quat_to_matrix, quat_rotate, norm3
+    use, intrinsic :: iso_fortran_env, only: int64
+    implicit none
+    private
+
+    public :: test_step_laws
+
+    real(wp), parameter :: eps = epsilon(1.0_wp)
+
+    !> Largest difference over the random motions below: two steps, at most one orbit long each, bodies away
+    !> from no special case.
+    real(wp), parameter :: two_steps = 4000*eps
+
+    real(wp), parameter :: no_turn(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+    real(wp), parameter :: identity(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, &
+                                                     0.0_wp, 0.0_wp, 1.0_wp], [3, 3])
+
+    !> A motion and a step, for the checks over many of them.
+    type :: sample
+        real(wp) :: moments(3), m(3), q(4), h
+    end type sample
+
+contains
+
+    subroutine test_step_laws(t)
+        type(tally), intent(inout) :: t
+        type(sample) :: samples(300)
+        integer(int64) :: seed
+        integer :: i
+
+        call t%open_suite('step-laws', 40)
+        seed = 903
+        do i = 1, size(samples)
+            call draw(samples(i), seed)
+        end do
+        call check_flow(t, samples)
+        call check_relabelling(t, samples)
+        call check_scaling(t, samples)
+        call check_quadrature(t, samples)
+        call check_order(t)
+        call check_conservation(t)
+        call check_continuity(t)
+        call check_separatrix(t)
+        call check_heavy_top(t)
+        call t%close_suite()
+    end subroutine test_step_laws
+
+    !> Group law, reversal, matrix against quaternion, the three frames.
+    subroutine check_flow(t, samples)
+        type(tally), intent(inout) :: t
+        type(sample), intent(in) :: samples(:)
+        real(wp) :: group(0:3), back(0:3), frames(3), m(3), m1(3), a(3, 3), a1(3, 3), q(4), q1(4)
+        integer :: i, frame
+
+        group = 0.0_wp
+        back = 0.0_wp
+        frames = 0.0_wp
+        do i = 1, size(samples)
+            associate (it => samples(i))
+                call frb_step(m1, a1, it%h, it%moments, it%m, quat_to_matrix(it%q))
+                call frb_step(m, a, 0.3_wp*it%h, it%moments, it%m, quat_to_matrix(it%q))
+                call frb_step(m, a, it%h - 0.3_wp*it%h, it%moments, m, a)
+                group(0) = max(group(0), maxval(abs(m - m1)), maxval(abs(a - a1)))
+                call frb_step(m, a, -it%h, it%moments, m1, a1)
+                back(0) = max(back(0), maxval(abs(m - it%m)), maxval(abs(a - quat_to_matrix(it%q))))
+                do frame = 1, 3
+                    call quat_step(m1, q1, it%h, it%moments, it%m, it%q, frame=frame)
+                    frames(frame) = max(frames(frame), maxval(abs(quat_to_matrix(q1) - a1)))
+                    call quat_step(m, q, 0.3_wp*it%h, it%moments, it%m, it%q, frame=frame)
+                    call quat_step(m, q, it%h - 0.3_wp*it%h, it%moments, m, q, frame=frame)
+                    group(frame) = max(group(frame), maxval(abs(m - m1)), maxval(abs(q - q1)))
+                    call quat_step(m, q, -it%h, it%moments, m1, q1, frame=frame)
+                    back(frame) = max(back(frame), maxval(abs(m - it%m)), maxval(abs(q - it%q)))
+                end do
+            end associate
+        end do
+        call t%at_most('two-steps-equal-one-step-of-their-sum', group(0), two_steps)
+        call t%at_most('two-quaternion-steps-equal-one-with-its-sign', maxval(group(1:)), two_steps)
+        call t%at_most('step-back-returns-the-start', back(0), two_steps)
+        call t%at_most('quaternion-step-back-returns-the-start-with-its-sign', maxval(back(1:)), two_steps)
+        call t%at_most('matrix-and-quaternion-agree', frames(1), two_steps)
+        call t%at_most('frame-2-agrees', frames(2), two_steps)
+        call t%at_most('frame-3-agrees', frames(3), two_steps)
+    end subroutine check_flow
+
+    !> Other names for the axes: every permutation, odd ones with a reflection made a rotation by a sign.
+    subroutine check_relabelling(t, samples)
+        type(tally), intent(inout) :: t
+        type(sample), intent(in) :: samples(:)
+        integer, parameter :: orders(3, 6) = reshape([1, 2, 3, 2, 3, 1, 3, 1, 2, &
+                                                         2, 1, 3, 1, 3, 2, 3, 2, 1], [3, 6])
+        real(wp) :: m(3), q(4), a(3, 3), mm(3), qq(4), aa(3, 3), sense, worst(2)
+        integer :: i, k
+
+        worst = 0.0_wp
+        do i = 1, size(samples)
+            associate (it => samples(i))
+                call quat_step(m, q, it%h, it%moments, it%m, no_turn)
+                call frb_step(m, a, it%h, it%moments, it%m, identity)
+                do k = 2, 6
+                    sense = merge(1.0_wp, -1.0_wp, k <= 3)
+                    call quat_step(mm, qq, it%h, it%moments(orders(:, k)), sense*it%m(orders(:, k)), no_turn)
+                    worst(1) = max(worst(1), maxval(abs(mm - sense*m(orders(:, k)))), &
+                                   maxval(abs(qq - [q(1), sense*q(1 + orders(:, k))])))
+                    call frb_step(mm, aa, it%h, it%moments(orders(:, k)), sense*it%m(orders(:, k)), identity)
+                    worst(2) = max(worst(2), maxval(abs(mm - sense*m(orders(:, k)))), &
+                                   maxval(abs(aa - a(orders(:, k), orders(:, k)))))
+                end do
+            end associate
+        end do
+        call t%at_most('relabelled-axes-give-relabelled-quaternions', worst(1), 64*eps)
+        call t%at_most('relabelled-axes-give-relabelled-matrices', worst(2), 64*eps)
+    end subroutine check_relabelling
+
+    !> Units: momentum times g with time over g; moments times g with time times g; |q| and Q carried along.
+    subroutine check_scaling(t, samples)
+        type(tally), intent(inout) :: t
+        type(sample), intent(in) :: samples(:)
+        real(wp), parameter :: factors(4) = [2.0_wp**40, 2.0_wp**(-40), 2.0_wp**900, 2.0_wp**(-900)]
+        real(wp) :: m(3), q(4), mm(3), qq(4), worst(3)
+        integer :: i, j
+
+        worst = 0.0_wp
+        do i = 1, size(samples), 10
+            associate (it => samples(i))
+                call quat_step(m, q, it%h, it%moments, it%m, it%q)
+                do j = 1, size(factors)
+                    call quat_step(mm, qq, it%h/factors(j), it%moments, it%m*factors(j), it%q)
+                    worst(1) = max(worst(1), maxval(abs(mm/factors(j) - m)), maxval(abs(qq - q)))
+                    call quat_step(mm, qq, it%h*factors(j), it%moments*factors(j), it%m, it%q)
+                    worst(2) = max(worst(2), maxval(abs(mm - m)), maxval(abs(qq - q)))
+                end do
+                call quat_step(mm, qq, it%h, it%moments, it%m, 4*it%q)
+                worst(3) = max(worst(3), maxval(abs(qq - 4*q)))
+            end associate
+        end do
+        call t%at_most('momentum-scales-as-one-over-time', worst(1), 64*eps)
+        call t%at_most('moments-scale-as-time', worst(2), 64*eps)
+        call t%at_most('norm-of-the-quaternion-is-carried-along', worst(3), 0.0_wp)
+    end subroutine check_scaling
+
+    !> Semi-exact steps: the momentum is exact, the step is symmetric in time, many points are exact.
+    subroutine check_quadrature(t, samples)
+        type(tally), intent(inout) :: t
+        type(sample), intent(in) :: samples(:)
+        real(wp) :: m(3), m1(3), q(4), q1(4), a(3, 3), momentum, back, points, space, norm
+        integer :: i, frame
+
+        momentum = 0.0_wp
+        back = 0.0_wp
+        points = 0.0_wp
+        space = 0.0_wp
+        do i = 1, size(samples)
+            associate (it => samples(i))
+                do frame = 1, 3
+                    call quat_step(m, q, it%h, it%moments, it%m, no_turn, 0, frame)
+                    call quat_step(m1, q1, it%h, it%moments, it%m, no_turn, 2, frame)
+                    norm = norm3(it%m)
+                    momentum = max(momentum, maxval(abs(m - m1))/norm)
+                    space = max(space, norm3(quat_rotate(q1, m1) - it%m)/norm)
+                    call quat_step(m1, q1, -it%h, it%moments, m1, q1, 2, frame)
+                    back = max(back, min(maxval(abs(q1 - no_turn)), maxval(abs(q1 + no_turn))))
+                    call quat_step(m1, q1, 0.1_wp*it%h, it%moments, it%m, no_turn, 60, frame)
+                    call quat_step(m, q, 0.1_wp*it%h, it%moments, it%m, no_turn, 0, frame)
+                    points = max(points, maxval(abs(q1 - q)))
+                end do
+                call frb_step(m1, a, it%h, it%moments, it%m, identity, 1)
+                space = max(space, norm3(matmul(a, m1) - it%m)/norm)
+            end associate
+        end do
+        call t%at_most('semi-exact-momentum-is-exact', momentum, two_steps)
+        call t%at_most('semi-exact-step-back-returns-the-start', back, two_steps)
+        call t%at_most('semi-exact-space-momentum-is-constant', space, 64*eps)
+        call t%at_most('sixty-points-are-exact', points, two_steps)
+    end subroutine check_quadrature
+
+    !> Order 2 np over [0, 4], in 16 and 32 steps.
+    subroutine check_order(t)
+        type(tally), intent(inout) :: t
+        real(wp), parameter :: moments(3) = [0.345_wp, 0.653_wp, 1.0_wp], m0(3) = [0.5_wp, 0.9_wp, 0.8_wp]
+        real(wp) :: error(2), m(3), q(4), exact(4), a(3, 3)
+        integer :: np, frame, i, j
+
+        call quat_step(m, exact, 4.0_wp, moments, m0, no_turn)
+        do np = 1, 4
+            do frame = 0, 3
+                do i = 1, 2
+                    m = m0
+                    q = no_turn
+                    a = identity
+                    do j = 1, 16*i
+                        if (frame == 0) then
+                            call frb_step(m, a, 0.25_wp/i, moments, m, a, np)
+                        else
+                            call quat_step(m, q, 0.25_wp/i, moments, m, q, np, frame)
+                        end if
+                    end do
+                    error(i) = min(maxval(abs(q - exact)), maxval(abs(q + exact)))
+                    if (frame == 0) error(i) = maxval(abs(a - quat_to_matrix(exact)))
+                end do
+                call t%close_to('order-is-twice-the-number-of-points: '//achar(48 + np)//', frame '// &
+                                achar(48 + frame), &
+                                log(error(1)/error(2))/log(2.0_wp), real(2*np, wp), 0.25_wp)
+            end do
+        end do
+    end subroutine check_order
+
+    !> 20 000 steps: |m|, energy, momentum in space, orthogonality.
+    subroutine check_conservation(t)
+        type(tally), intent(inout) :: t
+        real(wp), parameter :: moments(3) = [0.6_wp, 0.8_wp, 1.0_wp], m0(3) = [0.5_wp, -0.9_wp, 0.8_wp]
+        real(wp), parameter :: drift = 1.0e-12_wp
+        real(wp) :: m(3), mq(3), q(4), a(3, 3)
+        integer :: i
+
+        m = m0
+        mq = m0
+        q = no_turn
+        a = identity
+        do i = 1, 20000
+            call frb_step(m, a, 0.1_wp, moments, m, a)
+            call quat_step(mq, q, 0.1_wp, moments, mq, q)
+        end do
+        call t%at_most('norm-of-the-momentum-is-constant', abs(norm3(m)/norm3(m0) - 1), drift)
+        call t%at_most('energy-is-constant', abs(sum(m**2/moments)/sum(m0**2/moments) - 1), drift)
+        call t%at_most('space-momentum-is-constant', &
+                       max(norm3(matmul(a, m) - m0), norm3(quat_rotate(q, mq) - m0)), drift)
+        call t%at_most('attitude-stays-orthogonal-and-unit', &
+                       max(maxval(abs(matmul(transpose(a), a) - identity)), abs(sqrt(sum(q**2)) - 1)), drift)
+    end subroutine check_conservation
+
+    !> q(h) is continuous in h over many periods, in each frame and both cases of the motion.
+    subroutine check_continuity(t)
+        type(tally), intent(inout) :: t
+        real(wp), parameter :: moments(3) = [0.4_wp, 0.7_wp, 1.0_wp]
+        real(wp), parameter :: starts(3, 4) = reshape([0.9_wp, 0.3_wp, 0.2_wp, 0.2_wp, 0.3_wp, 0.9_wp, &
+                                                       -0.9_wp, 0.3_wp, 0.2_wp, 0.2_wp, 0.3_wp, -0.9_wp], &
+                                                      [3, 4])
+        real(wp) :: m(3), q(4), last(4), jump
+        integer :: i, start, frame
+
+        jump = 0.0_wp
+        do start = 1, 4
+            do frame = 1, 3
+                last = no_turn
+                do i = -2000, 2000
+                    call quat_step(m, q, 0.05_wp*i, moments, starts(:, start), no_turn, frame=frame)
+                    if (i > -2000) jump = max(jump, maxval(abs(q - last)))
+                    last = q
+                end do
+            end do
+        end do
+        call t%at_most('quaternion-is-continuous-over-many-periods', jump, 0.1_wp)
+    end subroutine check_continuity
+
+    !> From both sides of the separatrix and on it, for steps up to h = 1e8: finite, on the orbit.
+    subroutine check_separatrix(t)
+        type(tally), intent(inout) :: t
+        real(wp), parameter :: moments(3) = [2.0_wp, 3.0_wp, 6.0_wp]
+        real(wp) :: m0(3), m(3), q(4), a(3, 3), worst
+        integer :: i, j, frame
+
+        worst = 0.0_wp
+        do i = -16, 16
+            m0 = [0.4_wp, -0.8_wp, 0.4_wp]
+            if (i /= 0) m0(1) = m0(1)*(1 + sign(10.0_wp**(-abs(i)), real(i, wp)))
+            do j = -8, 40
+                call frb_step(m, a, 10.0_wp**(0.2_wp*j), moments, m0, identity)
+                worst = max(worst, abs(norm3(m)/norm3(m0) - 1), norm3(matmul(a, m) - m0), &
+                            abs(sum(m**2/moments)/sum(m0**2/moments) - 1), &
+                            maxval(abs(matmul(transpose(a), a) - identity)))
+                do frame = 1, 3
+                    call quat_step(m, q, -10.0_wp**(0.2_wp*j), moments, m0, no_turn, frame=frame)
+                    worst = max(worst, abs(norm3(m)/norm3(m0) - 1), norm3(quat_rotate(q, m) - m0), &
+                                abs(sum(m**2/moments)/sum(m0**2/moments) - 1), abs(sqrt(sum(q**2)) - 1))
+                end do
+            end do
+        end do
+        call t%at_most('near-separatrix-stays-on-its-orbit', worst, 64*eps)
+    end subroutine check_separatrix
+
+    !> The paper's section 4.3: the heavy top by the splitting (23), with the corrected a_4, against the
+    !> published output after one step and at t = 5000 (published with the misprinted a_4, hence 1e-8).
+    subroutine check_heavy_top(t)
+        type(tally), intent(inout) :: t
+        real(wp), parameter :: moments(3) = [1.0_wp, 1.0126869887825154_wp, 3.3062374224730378_wp]
+        real(wp), parameter :: u0(3) = [9.5586303547238536e-05_wp, 4.8777318247201465e-04_wp, &
+                                        -8.6772148817192390e-04_wp]
+        real(wp) :: m(3), a(3, 3)
+        integer :: i
+
+        m = [-3.4790957088547336e-01_wp, -1.9822914599675923e-01_wp, -9.1633189192763642e-01_wp]
+        a = identity
+        call split_step(m, a)
+        call t%close_to('heavy-top-after-one-step', m, [-0.3915152739603944_wp, -0.0790616195912371_wp, &
+                                                        -0.9166557171043519_wp], 1.0e-13_wp)
+        do i = 2, 10000
+            call split_step(m, a)
+        end do
+        call t%close_to('heavy-top-at-5000', m, [0.0659419922367005_wp, 0.3964036062397627_wp, &
+                                                 -0.9151821877825491_wp], 1.0e-8_wp)
+
+    contains
+
+        subroutine split_step(m, a)
+            real(wp), intent(inout) :: m(3), a(3, 3)
+            real(wp), parameter :: drift_half(7) = [ &
+                0.0378593198406116_wp, 0.102635633102435_wp, -0.0258678882665587_wp, 0.314241403071447_wp, &
+                -0.130144459517415_wp, 0.106417700369543_wp, -0.00879424312851058_wp]
+            real(wp), parameter :: kick_half(6) = [ &
+                0.09171915262446165_wp, 0.183983170005006_wp, -0.05653436583288827_wp, &
+                0.004914688774712854_wp, 0.143761127168358_wp, 0.328567693746804_wp]
+            real(wp), parameter :: h = 0.5_wp
+            real(wp) :: drift(8), kick(7), u(3)
+            integer :: k
+
+            drift = [drift_half, 1 - 2*sum(drift_half)]
+            kick = [kick_half, 0.5_wp - sum(kick_half)]
+            do k = 1, 14
+                call frb_step(m, a, drift(min(k, 16 - k))*h, moments, m, a)
+                u = matmul(u0, a)
+                m(1) = m(1) + kick(min(k, 15 - k))*h*u(2)
+                m(2) = m(2) - kick(min(k, 15 - k))*h*u(1)
+            end do
+            call frb_step(m, a, drift(1)*h, moments, m, a)
+        end subroutine split_step
+
+    end subroutine check_heavy_top
+
+    !> The next random motion: moments between 0.2 and 1, momentum and attitude any direction, |h| < 4.
+    subroutine draw(it, seed)
+        type(sample), intent(out) :: it
+        integer(int64), intent(inout) :: seed
+        integer :: i
+
+        do i = 1, 3
+            it%moments(i) = 0.2_wp + 0.8_wp*uniform()
+            it%m(i) = 2*uniform() - 1
+        end do
+        do i = 1, 4
+            it%q(i) = 2*uniform() - 1
+        end do
+        it%q = it%q/sqrt(sum(it%q**2))
+        it%h = 8*uniform() - 4
+
+    contains
+
+        !> Uniform on (0, 1), Lehmer's generator with multiplier 48271.
+        function uniform() result(x)
+            real(wp) :: x
+
+            seed = mod(48271_int64*seed, 2147483647_int64)
+            x = real(seed, wp)/2147483647.0_wp
+        end function uniform
+
+    end subroutine draw
+
+end module frb_test_step_laws
