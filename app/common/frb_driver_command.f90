@@ -1,7 +1,9 @@
-!> The command line of the driver programs: `driver_exampleN [INIT] [-o OUT]`, `--help`, `--version`.
+!> The command line of the driver programs: `driver_exampleN [INIT] [-o OUT]`, `--help`, `--version`; for
+!> example 1 also `--scheme NAME` and `--drift NAME`.
 !>
 !> What is wrong is said in one line on standard error, with exit code 1.
 module frb_driver_command
+    use frb, only: scheme_names
     use frb_init_files, only: init_values, read_init_file
     use frb_out_files, only: out_file
     use frb_version, only: version
@@ -10,12 +12,12 @@ module frb_driver_command
     implicit none
     private
 
-    public :: begin_run, fail, fail_run
+    public :: begin_run, fail, fail_run, joined
 
     !> What each program computes, and what a record of its output holds.
     character(*), parameter :: purposes(0:4) = [character(80) :: &
         'the motion of a free rigid body, one step of size h, attitude a matrix', &
-        'a heavy top, a sixth-order splitting around the free rigid body', &
+        'a heavy top, by splitting around the free rigid body', &
         'the motion of a free rigid body, one step of size h, attitude a quaternion', &
         'the motion of a free rigid body in N steps, attitude a matrix', &
         'the motion of a free rigid body in N steps, attitude a quaternion']
@@ -37,13 +39,17 @@ module frb_driver_command
 contains
 
     !> Reads the command line and the init file, and opens the output. Comes back only if a run is to be made.
-    subroutine begin_run(example, values, out)
+    subroutine begin_run(example, values, out, scheme, drift)
         integer, intent(in) :: example              !! 0 to 4
         type(init_values), intent(out) :: values
         type(out_file), intent(inout) :: out
-        character(:), allocatable :: init_path, out_path, error
+        character(:), allocatable, intent(out), optional :: scheme  !! name of a scheme, '' if none is given
+        character(:), allocatable, intent(out), optional :: drift   !! name of a drift, '' if none is given
+        character(:), allocatable :: init_path, out_path, scheme_name, drift_name, error
 
-        call read_command_line(example, init_path, out_path)
+        call read_command_line(example, init_path, out_path, scheme_name, drift_name)
+        if (present(scheme)) scheme = scheme_name
+        if (present(drift)) drift = drift_name
         if (init_path == out_path) call fail(init_path//': is the input, it cannot be the output too')
         call read_init_file(init_path, example, values, error)
         if (allocated(error)) call fail(error)
@@ -67,10 +73,10 @@ contains
         call fail(message)
     end subroutine fail_run
 
-    !> Paths of the init file and of the output, from the arguments or by default.
-    subroutine read_command_line(example, init_path, out_path)
+    !> Paths of the init file and of the output, from the arguments or by default, and names, '' by default.
+    subroutine read_command_line(example, init_path, out_path, scheme, drift)
         integer, intent(in) :: example
-        character(:), allocatable, intent(out) :: init_path, out_path
+        character(:), allocatable, intent(out) :: init_path, out_path, scheme, drift
         character(:), allocatable :: word
         character :: digit
         logical :: options
@@ -80,6 +86,8 @@ contains
         options = .true.
         init_path = ''
         out_path = ''
+        scheme = ''
+        drift = ''
         i = 0
         do while (i < command_argument_count())
             i = i + 1
@@ -91,11 +99,11 @@ contains
             else if (options .and. word == '--version') then
                 call finish(output_unit, 'driver_example'//digit//' (frb) '//version, 0)
             else if (options .and. word == '-o') then
-                i = i + 1
-                if (i > command_argument_count()) call fail('-o needs the name of a file (see --help)')
-                if (len(out_path) > 0) call fail('more than one -o (see --help)')
-                out_path = argument(i)
-                if (len_trim(out_path) == 0) call fail('-o needs the name of a file (see --help)')
+                call take_value(word, 'a file', i, out_path)
+            else if (options .and. example == 1 .and. word == '--scheme') then
+                call take_value(word, 'a scheme', i, scheme)
+            else if (options .and. example == 1 .and. word == '--drift') then
+                call take_value(word, 'a drift', i, drift)
             else if (options .and. index(word, '-') == 1) then
                 call fail('unknown option '//word//' (see --help)')
             else if (len(init_path) > 0) then
@@ -109,6 +117,19 @@ contains
         if (len(init_path) == 0) init_path = 'data/init_example'//digit//'.dat'
         if (len(out_path) == 0) out_path = 'out_example'//digit//'.dat'
     end subroutine read_command_line
+
+    !> The value of an option, the argument after it.
+    subroutine take_value(option, what, i, value)
+        character(*), intent(in) :: option, what
+        integer, intent(inout) :: i                                 ! the option's place, then the value's
+        character(:), allocatable, intent(inout) :: value           ! '' before
+
+        i = i + 1
+        if (i > command_argument_count()) call fail(option//' needs the name of '//what//' (see --help)')
+        if (len(value) > 0) call fail('more than one '//option//' (see --help)')
+        value = argument(i)
+        if (len_trim(value) == 0) call fail(option//' needs the name of '//what//' (see --help)')
+    end subroutine take_value
 
     !> One argument of the command line.
     function argument(i) result(word)
@@ -127,17 +148,41 @@ contains
         character(:), allocatable :: text
         character(*), parameter :: nl = new_line('a')
         character :: digit
+        character(:), allocatable :: more_usage, more_options
 
         digit = achar(iachar('0') + example)
-        text = 'usage: driver_example'//digit//' [INIT] [-o OUT]'//nl// &
+        more_usage = ''
+        more_options = ''
+        if (example == 1) then
+            more_usage = ' [--scheme NAME] [--drift NAME]'
+            more_options = &
+                '  --scheme   one of these in place of the file''s coefficients:'//nl// &
+                '             '//joined(scheme_names)//nl// &
+                '  --drift    the free body by free_flow (default), frb_step or quat_step, exact, or'//nl// &
+                '             by frb_step:N or quat_step:N, semi-exact with N Gauss points'//nl
+        end if
+        text = 'usage: driver_example'//digit//' [INIT] [-o OUT]'//more_usage//nl// &
                'Computes '//trim(purposes(example))//'.'//nl//nl// &
                '  INIT       input, data/init_example'//digit// &
                            '.dat by default; data/README.md has the format'//nl// &
                '  -o OUT     output, out_example'//digit//'.dat by default; one record a line:'//nl// &
                '             '//trim(records(example))//nl// &
+               more_options// &
                '  --help     this text'//nl// &
                '  --version  name and version'
     end function help
+
+    !> Words in one line.
+    pure function joined(words) result(line)
+        character(*), intent(in) :: words(:)
+        character(:), allocatable :: line
+        integer :: i
+
+        line = trim(words(1))
+        do i = 2, size(words)
+            line = line//' '//trim(words(i))
+        end do
+    end function joined
 
     !> Ends the program with a text and an exit code.
     subroutine finish(unit, text, code)

@@ -105,17 +105,21 @@ contains
     !> `status_bad_scheme` unless the coefficients are finite, symmetric to 1e-14 of the largest and sum to
     !> one within 1e-12, with at most `most_stages` drifts and kicks. What order they have, `conditions`
     !> tells.
-    pure function scheme_from_coefficients(a, b, name) result(scheme)
+    pure function scheme_from_coefficients(a, b, name, tolerance) result(scheme)
         real(wp), intent(in) :: a(:)                    !! drifts
         real(wp), intent(in) :: b(:)                    !! kicks
         character(*), intent(in), optional :: name
+        real(wp), intent(in), optional :: tolerance     !! how far from one a sum may be, default 1e-12
         type(splitting_scheme) :: scheme
+        real(wp) :: inconsistency
 
         scheme%name = 'own'
         if (present(name)) scheme%name = name
         if (abs(size(a) - size(b)) /= 1 .or. min(size(a), size(b)) < 1) return
         if (max(size(a), size(b)) > most_stages) return
-        if (.not. (consistent(a) .and. consistent(b))) return
+        inconsistency = 1.0e-12_wp
+        if (present(tolerance)) inconsistency = tolerance
+        if (.not. (consistent(a, inconsistency) .and. consistent(b, inconsistency))) return
         scheme%status = status_ok
         scheme%drift_first = size(a) > size(b)
         scheme%drifts = size(a)
@@ -125,10 +129,11 @@ contains
     end function scheme_from_coefficients
 
     !> Whether coefficients are finite, symmetric and sum to one.
-    pure function consistent(c) result(good)
+    pure function consistent(c, inconsistency) result(good)
         real(wp), intent(in) :: c(:)
+        real(wp), intent(in) :: inconsistency
         logical :: good
-        real(wp), parameter :: asymmetry = 1.0e-14_wp, inconsistency = 1.0e-12_wp
+        real(wp), parameter :: asymmetry = 1.0e-14_wp
         real(wp) :: largest
 
         good = all(ieee_is_finite(c))
