@@ -106,8 +106,8 @@ def digits_needed(name, args):
     """cn and dn can be as small as sqrt(kc2), 1 - n sin**2 as large as 1e300; RJ needs the digits of p."""
     if name in ("gx", "gw"):
         return 40
-    if name == "rj" and abs(args[3]) < 1e-200:
-        return 400
+    if name == "rj" and abs(args[3]) < 1e-20 * max(args):
+        return 700
     return 700 if min(args) < -1e20 or name not in ("rf", "rc", "rj", "rd") and args[-1] < 1e-15 else 60
 
 

@@ -85,7 +85,7 @@ contains
 
     !> Integral of the first kind F(phi, k) = int_0^phi dtheta/sqrt(1 - k**2 sin(theta)**2), (21).
     !> Domain: any finite phi, |k| <= 1 (or 0 <= kc2 <= 1), outside: NaN. At k = 1: the inverse Gudermannian
-    !> within +-pi/2, +-Infinity beyond.
+    !> within +-pi/2, +-Infinity beyond; so is a result beyond the largest number.
     !> Accuracy: 6 epsilon, relative, times the change that half an ulp of phi makes where that is larger;
     !> checked by agm: incomplete-integral-agrees-with-table.
     !> Source: (17)-(19).
@@ -112,7 +112,11 @@ contains
         else
             call half_turns(phi, turns, rest)
             call start_agm(complement, agm)
-            value = (turns*pi + scaled_angle(sin(rest), cos(rest), agm)/agm%power)/agm%mean
+            if (1.0e-10_wp*abs(phi) < agm%mean*(1.0e-10_wp*huge(1.0_wp)/2)) then
+                value = (turns*pi + scaled_angle(sin(rest), cos(rest), agm)/agm%power)/agm%mean
+            else
+                value = sign(ieee_value(1.0_wp, ieee_positive_inf), phi)
+            end if
         end if
     end function ellip_f
 

@@ -87,7 +87,8 @@ contains
     end function rc
 
     !> Integral of the third kind RJ(x, y, z, p), symmetric in x, y, z.
-    !> For p < 0 the Cauchy principal value, by DLMF 19.20.14.
+    !> For p < 0 the Cauchy principal value, by DLMF 19.20.14, as long as all but the smallest of x, y, z and
+    !> -p are within a factor 1e60 of one another, else NaN.
     !> Domain: x, y, z >= 0, at most one of them zero, p /= 0, all finite; outside: NaN. A result beyond the
     !> largest number comes back as +Infinity.
     !> Accuracy: 6 epsilon, relative, for p > 0; checked by carlson: rj-agrees-with-table. For p < 0 the same
@@ -144,7 +145,7 @@ contains
             first = rf_series(xn, yn, zn)
         else
             first = rf(x, y, z)
-            third = rj(x, y, z, p)
+            third = rj_rare(x, y, z, p)
         end if
     end subroutine rf_and_rj
 
@@ -350,16 +351,17 @@ contains
         end if
     end function rj_rare
 
-    !> Cauchy principal value RJ(x, y, z, -q), q > 0 (DLMF 19.20.14).
-    pure function rj_principal_value(x, y, z, q) result(value)
-        real(wp), intent(in) :: x, y, z, q
+    !> Cauchy principal value RJ(x0, y0, z0, -q), q > 0 (DLMF 19.20.14).
+    pure function rj_principal_value(x0, y0, z0, q) result(value)
+        real(wp), intent(in) :: x0, y0, z0, q
         real(wp) :: value
         real(wp) :: lowest, middle, highest, p, denominator, first, third, factor
+        real(wp) :: x, y, z, positive, total, quarter
         integer :: shift
 
-        lowest = min(x, y, z)
-        highest = max(x, y, z)
-        middle = max(min(x, y), min(x, z), min(y, z))
+        lowest = min(x0, y0, z0)
+        highest = max(x0, y0, z0)
+        middle = max(min(x0, y0), min(x0, z0), min(y0, z0))
         ! scaled by a power of four so that the larger of highest and q is about one
         shift = -2*(exponent(max(highest, q))/2)
         lowest = scale(lowest, shift)
@@ -368,7 +370,17 @@ contains
         factor = scale(q, shift)
         denominator = highest + factor
         p = (highest*(lowest + middle + factor) - lowest*middle)/denominator
-        call rf_and_rj(lowest, middle, highest, p, first, third)
+        if (min(middle, factor) < smallest_plain .or. .not. rj_is_plain(lowest, middle, highest, p)) then
+            value = ieee_value(1.0_wp, ieee_quiet_nan)
+            return
+        end if
+        x = lowest
+        y = middle
+        z = highest
+        positive = p
+        call rj_duplications(x, y, z, positive, total, quarter)
+        third = total + quarter*rj_series(x, y, z, positive)
+        first = rf_series(x, y, z)
         value = (p - highest)*third - 3*first
         if (lowest > 0.0_wp) value = value + 3*sqrt(lowest*middle*highest/(lowest*middle + p*factor)) &
             *rc(lowest*middle + p*factor, p*factor)
@@ -380,12 +392,12 @@ contains
     pure function rj_extreme(x, y, z, p) result(value)
         real(wp), intent(in) :: x, y, z, p
         real(wp) :: value
-        real(wp) :: s(4), sums(3), v(4), e, term, total, quarter, weight
+        real(wp) :: s(4), sums(3), v(4), e, w, mantissas, grown, term, total, quarter, weight
         integer :: shift, shifts, reference, power, n
 
         s = sqrt([x, y, z, p])
         total = 0.0_wp
-        reference = 0
+        reference = -1000000   ! below any power of two met
         shifts = 0      ! arguments of step n are 4**(shifts) times their true values / 4**n
         do n = 0, most_extreme_steps
             if (minval(s) > 1.0e-20_wp*maxval(s)) exit
@@ -393,22 +405,25 @@ contains
             s = scale(s, shift)
             shifts = shifts + shift
             sums = s(4) + s(1:3)
+            mantissas = fraction(sums(1))*fraction(sums(2))*fraction(sums(3))
+            grown = s(4)*s(4) + (s(1)*(s(2) + s(3)) + s(2)*s(3))   ! p + lambda
             ! 6 4**-n/d_n RC(1, 1+e_n), 1 + e_n = 2 sp (p + lambda)/d_n, in parts: mantissa and power of two
             e = ((s(4) - s(1))/sums(1))*((s(4) - s(2))/sums(2))*((s(4) - s(3))/sums(3))
             if (abs(e) <= 0.1_wp) then
                 term = rc_series(e)
             else
-                v(1) = s(4)/sums(1)
-                v(2) = (s(4)*(s(4)/sums(2)) + s(1)*((s(2) + s(3))/sums(2)) + s(2)*(s(3)/sums(2)))/sums(3)
-                term = rc_regular(1.0_wp, 2*v(1)*v(2))
+                ! RC(1, w) = 2**100 RC(2**200, 2**200 w), since w may be as small as 1e-315
+                w = 2*fraction(s(4))*fraction(grown)/mantissas
+                term = scale(rc_regular(scale(1.0_wp, 200), scale(w, 200 + exponent(s(4)) + exponent(grown) &
+                                                                  - sum(exponent(sums)))), 100)
             end if
-            term = 6*term/(fraction(sums(1))*fraction(sums(2))*fraction(sums(3)))
+            term = 6*term/mantissas
             power = 3*shifts - sum(exponent(sums)) - 2*n
-            if (n == 0) reference = power
-            total = total + scale(term, power - reference)
-            v = 0.25_wp*[(s(1) + s(2))*(s(1) + s(3)), (s(2) + s(1))*(s(2) + s(3)), &
-                         (s(3) + s(1))*(s(3) + s(2)), s(4)*s(4) + s(1)*(s(2) + s(3)) + s(2)*s(3)]
-            s = sqrt(v)
+            call add_scaled(term, power, total, reference)
+            ! roots of (x + lambda)/4 = (sx + sy)(sx + sz)/4 .. as products, which cannot underflow
+            v(1:3) = sqrt([s(1) + s(2), s(1) + s(3), s(2) + s(3)])
+            v(4) = sqrt(grown)
+            s = 0.5_wp*[v(1)*v(2), v(1)*v(3), v(2)*v(3), v(4)]
         end do
         shift = -exponent(maxval(s))
         s = scale(s, shift)
@@ -418,10 +433,23 @@ contains
         quarter = 1.0_wp
         call rj_duplications(v(1), v(2), v(3), v(4), weight, quarter)
         value = weight + quarter*rj_series(v(1), v(2), v(3), v(4))
-        if (n == 0) reference = 3*shifts
-        total = total + scale(value, 3*shifts - 2*n - reference)
+        call add_scaled(value, 3*shifts - 2*n, total, reference)
         value = scaled_or_infinite(total, reference)
     end function rj_extreme
+
+    !> total 2**reference grows by term 2**power; the larger of the two exponents is kept.
+    pure subroutine add_scaled(term, power, total, reference)
+        real(wp), intent(in) :: term
+        integer, intent(in) :: power
+        real(wp), intent(inout) :: total
+        integer, intent(inout) :: reference
+
+        if (power > reference) then
+            total = scale(total, max(reference - power, -3000))
+            reference = power
+        end if
+        total = total + scale(term, max(power - reference, -3000))
+    end subroutine add_scaled
 
     !> value 2**power, or +-Infinity where that would overflow; no exception is raised.
     pure function scaled_or_infinite(value, power) result(scaled)

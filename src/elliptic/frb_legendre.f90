@@ -18,6 +18,9 @@ module frb_legendre
     !> Below -1 the terms of RF - |n|/3 RJ would cancel; n is then taken to (k**2 - n)/(1 - n), in (k**2, 1).
     real(wp), parameter :: lowest_plain = -1.0_wp
 
+    !> Beyond this 1 - n the integral is that of k = 0 to rounding; below this kc2 it enters through F alone.
+    real(wp), parameter :: largest_divisor = 1.0e40_wp, smallest_complement = 1.0e-250_wp
+
 contains
 
     !> Pi(phi, n, k) for |phi| <= pi/2, by Carlson's RF and RJ.
@@ -49,7 +52,8 @@ contains
     !> Pi(phi2, n, k) - Pi(phi1, n, k), the integral from phi1 to phi2, any amplitudes.
     !> Whole half turns are counted by the complete integral, the rest is a difference of two incomplete ones.
     !> Domain: phi1, phi2 finite, |k| <= 1, n < 1 (or n sin**2 < 1 on the whole way); outside: NaN.
-    !> An integral across pi/2 + j pi at k = 1 or nc = 0 is Infinity, with the sign of phi2 - phi1.
+    !> An integral across pi/2 + j pi at k = 1 or nc = 0, or one beyond the largest number, is Infinity with the
+    !> sign of phi2 - phi1.
     !> Accuracy: 8 epsilon (|Pi(phi1)| + |Pi(phi2)|), and the change that half an ulp of the amplitudes makes;
     !> checked by legendre: difference-of-any-amplitudes-agrees-with-table.
     !> Source: section 3.4 (`ellint_pi`).
@@ -156,7 +160,11 @@ contains
                 if (complement_vanishes(kc2, nc)) value = sign(complete, turns)
                 return
             end if
-            value = 2*turns*complete
+            if (exponent(turns) + exponent(complete) >= maxexponent(1.0_wp) - 2) then
+                value = sign(ieee_value(1.0_wp, ieee_positive_inf), turns)
+                return
+            end if
+            value = turns*(2*complete)
         end if
         value = value + (pi_of_sine(s2, c2, n, kc2, nc) - pi_of_sine(s1, c1, n, kc2, nc))
     end function pi_between
@@ -173,7 +181,7 @@ contains
     pure function pi_of_sine(s, c, n, kc2, nc) result(value)
         real(wp), intent(in) :: s, c, n, kc2, nc
         real(wp) :: value
-        real(wp) :: ss, cc, dd, first, third, p, k2, other, k2_minus_n
+        real(wp) :: ss, cc, dd, first, third, p
 
         ss = s*s
         cc = c*c
@@ -187,14 +195,33 @@ contains
             call rf_and_rj(cc, dd, 1.0_wp, p, first, third)
             value = s*(first + (n*(1.0_wp/3))*ss*third)
         else
-            k2 = 1 - kc2
-            k2_minus_n = k2 - n
-            other = k2_minus_n/nc
-            call rf_and_rj(cc, dd, 1.0_wp, cc + (kc2/nc)*ss, first, third)
-            value = (-n/k2_minus_n)*(kc2/nc)*s*(first + (other*(1.0_wp/3))*ss*third) &
-                + (k2/k2_minus_n)*s*first &
-                + atan2(sqrt(-n/nc)*sqrt(k2_minus_n)*s*c, sqrt(dd))*sqrt(-n/k2_minus_n)/sqrt(nc)
+            value = pi_of_negative(s, c, n, kc2, nc)
         end if
     end function pi_of_sine
+
+    !> Pi for n < -1, from the one with N = (k**2 - n)/(1 - n), 1 - N = kc2/nc: three terms of one sign,
+    !> -n kc2/(nc (k**2 - n)) Pi(N) + k**2/(k**2 - n) F + sqrt(-n/(nc (k**2 - n))) atan(..).
+    pure function pi_of_negative(s, c, n, kc2, nc) result(value)
+        real(wp), intent(in) :: s, c, n, kc2, nc
+        real(wp) :: value
+        real(wp) :: ss, cc, dd, first, third, k2, k2_minus_n, floored
+
+        ss = s*s
+        cc = c*c
+        if (nc > largest_divisor) then
+            value = atan2(sqrt(nc)*s, c)/sqrt(nc)   ! but for a relative k**2 F/sqrt(nc), F < 400
+            return
+        end if
+        ! the first and the third term together forget kc2 as it goes to 0; so kc2/nc need not underflow
+        floored = max(kc2, smallest_complement)
+        dd = cc + floored*ss
+        call rf_and_rj(cc, dd, 1.0_wp, cc + (floored/nc)*ss, first, third)
+        k2 = 1 - floored
+        k2_minus_n = k2 - n
+        value = (-n/k2_minus_n)*(floored/nc)*s*(first + (k2_minus_n/nc*(1.0_wp/3))*ss*third) &
+            + atan2(sqrt(-n/nc)*sqrt(k2_minus_n)*s*c, sqrt(dd))*sqrt(-n/k2_minus_n)/sqrt(nc)
+        if (kc2 < floored) first = rf(cc, cc + kc2*ss, 1.0_wp)
+        value = value + (k2/k2_minus_n)*s*first
+    end function pi_of_negative
 
 end module frb_legendre

@@ -3,7 +3,7 @@ module frb_quadrature
     use frb_kinds, only: wp
     use frb_lapack, only: dstev
     use frb_status, only: conclude, status_ok, status_bad_count, status_lapack_failed
-    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_value, ieee_quiet_nan
+    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_value, ieee_quiet_nan, ieee_positive_inf
     implicit none
     private
 
@@ -64,6 +64,7 @@ contains
     !> int_phi1^phi2 dtheta / ((1 - n sin(theta)**2) sqrt(1 - k**2 sin(theta)**2)), by np Gauss points.
     !> Not exact: the error behaves like (phi2 - phi1)**(2 np + 1), so the semi-exact step has order 2 np.
     !> Antisymmetric in phi1, phi2 to rounding, so the step is time-symmetric.
+    !> A result beyond the largest number comes back as Infinity.
     !> Domain: phi1, phi2 finite, |k| <= 1 (or 0 <= kc2 <= 1), n sin**2 < 1; outside: NaN.
     !> Errors: status_bad_count for np < 1 (the value is then NaN), status_lapack_failed.
     !> Source: section 3.3, (20).
@@ -151,7 +152,12 @@ contains
                                         + integrand(middle - half*nodes(i), kc2, nc))
         end do
         if (np > 2*pairs) value = value + weights(pairs + 1)*integrand(middle, kc2, nc)
-        value = half*value
+        if (.not. ieee_is_finite(value)) return
+        if (exponent(half) + exponent(value) < maxexponent(1.0_wp)) then
+            value = half*value
+        else
+            value = sign(ieee_value(1.0_wp, ieee_positive_inf), half)
+        end if
     end function gauss_sum
 
     !> 1/((1 - n sin**2) sqrt(1 - k**2 sin**2)) as sums without cancellation; NaN outside its domain.
