@@ -85,8 +85,9 @@ contains
             'set xlabel "step size h {/Symbol w}  [rad]"', &
             'set ylabel "time per step / cheapest discrete Moser-Veselov"', &
             'set key outside right center vertical spacing 1.15 samplen 2.2 Left reverse', &
-            'set title "Cost of one step, whatever its accuracy; beyond 1 rad Moser-Veselov does not '// &
-            'converge"', &
+            'set title "Cost of one step, its accuracy aside"', &
+            'set label "Moser-Veselov does\nnot converge here" at 3,60 center textcolor rgb '// &
+            '"#0072B2"', &
             'set arrow 1 from graph 0, first 1 to graph 1, first 1 nohead lc rgb "#666666" dt 3', &
             'plot \'
         first = .true.

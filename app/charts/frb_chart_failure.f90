@@ -195,12 +195,14 @@ contains
         type(method), intent(in) :: methods(:)
         character(*), parameter :: shown(*) = [character(12) :: 'rk4', 'rotations4', 'dmv2', 'dmv10', &
             'dp-15', &
-            'quat_step-3', 'quat_step-10', 'quat_step-f3', 'quat_step-f2', 'quat_step', 'frb_step', &
+            'quat_step-1', 'quat_step-3', 'quat_step-f3', 'quat_step-f2', 'quat_step', 'frb_step', &
             'flow-batch', 'flow']
         integer :: unit, p, i, j, entries
 
-        call open_script(options, 'failure', 1000, 1060, unit)
-        write (unit, '(a)') 'set multiplot', 'set logscale xy', 'set format y "10^{%T}"', &
+        call open_script(options, 'failure', 1000, 1080, unit)
+        write (unit, '(a)') 'set multiplot title "Largest error of '//either(options%quick, '2', '7')// &
+            ' random cases; 1 unit: what rounding the inputs costs anyone"', 'set logscale xy', &
+            'set format y "10^{%T}"', &
             'set yrange [5e-3:1e19]', 'set ytics 1,1e4', &
             'set ytics add ("NaN" 1e18)', 'unset key', &
             'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0', 'set size 0.25,0.195'
@@ -215,7 +217,7 @@ contains
                     '"10^{-1}" 1e-1)'
             end if
             write (unit, '(a,f6.4,a,f6.4)') 'set origin ', 0.075 + 0.315*mod(p - 1, 3), ',', &
-                0.77 - 0.265*((p - 1)/3)
+                0.74 - 0.26*((p - 1)/3)
             write (unit, '(a)') either(mod(p, 3) == 1, 'set ylabel "error  [units]" offset 1.2,0', &
                 'unset ylabel')
             write (unit, '(a)') 'set title "'//trim(titles(p))//'" offset 0,-0.7', 'plot \', &
@@ -228,7 +230,7 @@ contains
             end do
             write (unit, '(a)') '  NaN notitle'
         end do
-        write (unit, '(a)') 'set origin 0.03,0.005', 'set size 0.94,0.17', 'unset border', 'unset tics', &
+        write (unit, '(a)') 'set origin 0.03,0.005', 'set size 0.94,0.16', 'unset border', 'unset tics', &
             'unset ylabel', 'unset title', 'unset grid', 'unset logscale', 'set xrange [0:1]', &
             'set yrange [0:1]', &
             'set key center center maxrows 4 samplen 2.2 spacing 1.2 Left reverse', &

@@ -99,7 +99,7 @@ contains
             item%option = option
             item%points = points
             if (present(tolerance)) item%tolerance = tolerance
-            item%exact = family <= family_paper_a
+            item%exact = family <= family_paper_a .and. points == 0
             item%colour = colour
             item%dash = dash
             item%symbol = symbol

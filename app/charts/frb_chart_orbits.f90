@@ -59,9 +59,9 @@ contains
             end do
         end do
         close (unit)
-        call open_script(options, 'orbits', 640, 620, unit)
+        call open_script(options, 'orbits', 660, 600, unit)
         write (unit, '(a)') 'unset border', 'unset tics', 'unset grid', 'set size ratio -1', 'unset key', &
-            'set xrange [-1.3:1.3]', 'set yrange [-1.25:1.3]', &
+            'set xrange [-1.2:1.5]', 'set yrange [-1.1:1.3]', &
             'set object 1 circle at 0,0 size first 1 fillstyle solid border lc rgb "#888888" fc rgb '// &
             '"#f4f4f4" behind', &
             'set title "Momentum of a free body, I = (1, 2, 3): every orbit is one formula"'
@@ -111,7 +111,7 @@ contains
         write (unit, '(4(a,f7.3),a)') 'set arrow from ', tip(1), ',', tip(2), ' to ', out(1), ',', out(2), &
             ' head filled size 0.04,20 lc rgb "#000000" lw 2 front'
         write (unit, '(a,f7.3,a,f7.3,a)') 'set label "'//text//'" at ', out(1), ',', out(2), &
-            ' '//either(tip(1) > 0.5_wp, 'right offset 0,-1.0', 'center offset 0,0.9')//' front'
+            ' '//either(tip(1) > 0.5_wp, 'center offset 0,-1.0', 'center offset 0,0.9')//' front'
     end subroutine label_axis
 
     !> The tennis racket turned about its middle axis: flips, and how well methods keep energy and momentum.

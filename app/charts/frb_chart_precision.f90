@@ -64,7 +64,7 @@ contains
         allocate (methods, source=catalogue())
         allocate (keep(size(methods)))
         do i = 1, size(methods)
-            keep(i) = methods(i)%family /= family_batch .and. methods(i)%family /= family_momentum &
+            keep(i) = methods(i)%family /= family_momentum &
                 .and. methods(i)%family /= family_matrix
             if (methods(i)%family == family_dp) keep(i) = methods(i)%key == 'dp-12'
         end do
@@ -72,7 +72,7 @@ contains
         do i = 1, size(chosen)
             if (chosen(i)%family == family_dp) then
                 chosen(i)%key = 'dp'
-                chosen(i)%label = 'Dormand-Prince 8(5,3)'
+                chosen(i)%label = 'DoPri 8(5,3)'
             end if
         end do
     end function curves
@@ -106,12 +106,14 @@ contains
             counts(i) = 14
             if (with%exact) counts(i) = 4
             if (with%family == family_flow) counts(i) = 5
+            if (with%family == family_batch) counts(i) = 3
+            if (with%points > 0) counts(i) = 11
             if (options%quick) counts(i) = (counts(i) + 1)/2
             do k = 1, counts(i)
                 n = merge(2*k - 1, k, options%quick)
                 steps = 5*2**(n - 1)
                 if (with%exact) steps = 10**(n - 1)
-                if (with%exact .and. with%points > 0) steps = 4**(n - 1)
+                if (with%points > 0) steps = 2**(n - 1)
                 points(k, i)%setting = steps
                 if (with%family == family_dp) then
                     steps = 1
@@ -119,7 +121,8 @@ contains
                     points(k, i)%setting = with%tolerance
                 end if
                 total = total + 1
-                works(total) = new_workload(with, item%moments, item%m0, item%t/steps, 1)
+                works(total) = new_workload(with, item%moments, item%m0, item%t/steps, &
+                                            merge(1000, 1, with%family == family_batch))
                 works(total)%nsteps = steps
                 call errors_of(with, item, steps, points(k, i)%error_m, points(k, i)%error_q)
             end do

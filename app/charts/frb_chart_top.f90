@@ -257,8 +257,8 @@ contains
         type(raster) :: whole, detail
         integer :: unit
 
-        call run_torus(options, [-0.46_wp, -0.46_wp], [0.46_wp, 0.46_wp], whole)
-        call run_torus(options, [0.3972_wp, -0.06_wp], [0.4002_wp, 0.06_wp], detail)
+        call run_torus([-0.46_wp, -0.46_wp], [0.46_wp, 0.46_wp], 400, whole)
+        call run_torus([0.3972_wp, -0.06_wp], [0.4002_wp, 0.06_wp], 240, detail)
         call open_table(options, 'torus', &
             'where the momentum of the paper''s heavy top is, h = 0.5, t up to 5e4; '// &
             'blocks: the whole, a close-up', 'm1, m2, number of steps in the pixel (NaN: none)', unit)
@@ -304,21 +304,21 @@ contains
 
     end subroutine chart_torus
 
-    subroutine run_torus(options, low, high, seen)
-        type(settings), intent(in) :: options
+    subroutine run_torus(low, high, pixels, seen)
         real(wp), intent(in) :: low(2), high(2)
+        integer, intent(in) :: pixels
         type(raster), intent(out) :: seen
         type(heavy_top) :: scene
         real(wp) :: m(3), q(4)
 
-        allocate (seen%hits(400, 400), source=0)
+        allocate (seen%hits(pixels, pixels), source=0)
         seen%low = low
         seen%high = high
         scene%force = paper_u0
         m = paper_m0
         q = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-        call integrate(rigid_body(paper_moments), splitting_scheme('srkn14'), scene, 0.5_wp, &
-                       merge(20000, 100000, options%quick), m, q, observer=seen)
+        call integrate(rigid_body(paper_moments), splitting_scheme('srkn14'), scene, 0.5_wp, 100000, m, q, &
+            observer=seen)
     end subroutine run_torus
 
     subroutine observe_raster(self, step, t, m, q)
