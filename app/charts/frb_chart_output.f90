@@ -69,14 +69,17 @@ contains
         character(*), intent(in) :: name
         integer :: code, command_code
 
+        call execute_command_line('command -v gnuplot > /dev/null', exitstat=code, cmdstat=command_code)
+        if (command_code /= 0 .or. code /= 0) then
+            call say('  '//options%folder//'/'//name//'.gp: not drawn, there is no gnuplot; table and script are kept')
+            return
+        end if
         call execute_command_line('cd '''//options%folder//''' && gnuplot '//name//'.gp', exitstat=code, &
                                   cmdstat=command_code)
         if (command_code == 0 .and. code == 0) then
             call say('  '//options%folder//'/'//name//'.svg')
         else
-            call say('  no picture: gnuplot is missing or failed; the table and the script '// &
-                options%folder// &
-                     '/'//name//'.gp are kept, "gnuplot '//name//'.gp" in that folder draws it')
+            call say('  '//options%folder//'/'//name//'.gp: gnuplot failed; table and script are kept')
         end if
     end subroutine draw
 
