@@ -31,10 +31,10 @@ contains
     !> Accuracy of the exact step, in units of the inherent sensitivity (data/reference): median below 1 and
     !> maximum below 4 in every group, for m and Q; Q orthogonal to 1e-14 (checked by steps). In a chain of N
     !> steps |m| and the energy stay to 1e-13, Q^T Q leaves the identity by about N 5e-17.
-    !> The sensitivity itself grows near the middle axis and the separatrix: once h covers a half turn, m and Q
-    !> lose about log10(1/(1 - k**2)) of their 16 digits, all of them for 1 - k**2 below 1e-16, where m stays on
-    !> the orbit, Q orthogonal and Q m constant. With np >= 1 Q also loses digits, and needs a smaller h, where
-    !> m' is small: the frame turns fast there.
+    !> The sensitivity itself grows near the middle axis and the separatrix: once h covers a half turn, m and
+    !> Q lose about log10(1/(1 - k**2)) of their 16 digits, all of them for 1 - k**2 below 1e-16, where m stays
+    !> on the orbit, Q orthogonal and Q m constant. With np >= 1 Q also loses digits, and needs a smaller h,
+    !> where m' is small: the frame turns fast there.
     !>
     !> Errors: status_bad_moments (not positive and finite), status_bad_momentum, status_bad_time,
     !> status_bad_attitude (not finite), status_bad_count (np < 0 or np > 1000). The output is then the input.
