@@ -1,12 +1,26 @@
 !> The exact flow of the free rigid body, `free_flow`: momentum only, with a quaternion, with a matrix; for one
-!> body and for many.
+!> body and for many. One formula for every orbit: no case is special, no input of finite numbers fails.
+!>
+!> State: m, angular momentum in the body; q or a, attitude, body to space. Any consistent units. Both are
+!> advanced in place by the time h, of any sign and size, as m + increment and q + increment: N short steps
+!> gather rounding like a random walk, and the norms do not drift. A quaternion keeps the norm it comes with,
+!> a matrix its defect of orthogonality.
+!>
+!> Errors (`stat`): the status of a body that could not be made; `status_bad_momentum`, `status_bad_time`,
+!> `status_bad_attitude` for NaN, Inf and a quaternion of norm zero; `status_bad_count` for arrays that do not
+!> match. Refused state is left as it is. Zero momentum, h = 0 and n = 0 are the identity.
+!>
+!> Accuracy: on the 325 cases of data/reference and on 3900 of other seeds, m and attitude within
+!> 3 units (median 0.5) of the inherent sensitivity; held by the suite `free-flow`.
+!> Phases have no digits left when the angle turned in one step passes 2^53; the state is then on the right
+!> orbit, at an arbitrary phase.
 module frb_free_flow
-    use frb_flow_core, only: flow_core
+    use frb_flow_block, only: lanes, block_of_bodies, flow_block
+    use frb_flow_limits, only: plain_largest, plain_smallest
+    use frb_flow_one, only: flow_one, flow_turned
     use frb_inertia, only: rigid_body
     use frb_kinds, only: wp
-    use frb_rotations, only: norm3, quat_conjugate, quat_product, quat_rotate, quat_to_matrix
-    use frb_status, only: conclude, status_ok, status_bad_momentum, status_bad_attitude, status_bad_time, &
-        status_bad_count
+    use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_count, status_bad_time
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
     implicit none
     private
@@ -19,169 +33,329 @@ module frb_free_flow
         module procedure flow_matrix
         module procedure flow_momenta
         module procedure flow_quaternions
-        module procedure flow_momenta_bodies
-        module procedure flow_quaternions_bodies
+        module procedure flow_momenta_of_bodies
+        module procedure flow_quaternions_of_bodies
     end interface free_flow
 
 contains
 
-    !> Momentum m of a free body after the time h, in place.
+    !> Advances the momentum of one body: no integral of the third kind, no attitude cost.
     subroutine flow_momentum(body, h, m, stat)
         type(rigid_body), intent(in) :: body
-        real(wp), intent(in) :: h
-        real(wp), intent(inout) :: m(3)
+        real(wp), intent(in) :: h               !! time, any sign
+        real(wp), intent(inout) :: m(3)         !! body angular momentum
         integer, intent(out), optional :: stat
-        real(wp) :: q(4)
         integer :: code
 
-        q = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-        call step(body, h, m, q, 0, code)
-        call conclude(code, 'free_flow', stat)
+        code = body%status
+        if (code == status_ok) then
+            if (body%turned) then
+                call flow_turned(body, h, m, code)
+            else
+                call flow_one(body, h, m, code)
+            end if
+        end if
+        if (present(stat)) then
+            stat = code
+        else if (code /= status_ok) then
+            call conclude(code, 'free_flow')
+        end if
     end subroutine flow_momentum
 
-    !> Momentum m and attitude q of a free body after the time h, in place.
+    !> Advances the momentum and the attitude quaternion of one body.
     subroutine flow_quaternion(body, h, m, q, stat)
         type(rigid_body), intent(in) :: body
-        real(wp), intent(in) :: h
-        real(wp), intent(inout) :: m(3)
-        real(wp), intent(inout) :: q(4)
+        real(wp), intent(in) :: h               !! time, any sign
+        real(wp), intent(inout) :: m(3)         !! body angular momentum
+        real(wp), intent(inout) :: q(4)         !! attitude, scalar first, body to space; not zero
         integer, intent(out), optional :: stat
         integer :: code
 
-        call step(body, h, m, q, 1, code)
-        call conclude(code, 'free_flow', stat)
+        code = body%status
+        if (code == status_ok) then
+            if (body%turned) then
+                call flow_turned(body, h, m, code, q)
+            else
+                call flow_one(body, h, m, code, q)
+            end if
+        end if
+        if (present(stat)) then
+            stat = code
+        else if (code /= status_ok) then
+            call conclude(code, 'free_flow')
+        end if
     end subroutine flow_quaternion
 
-    !> Momentum m and attitude matrix a of a free body after the time h, in place.
+    !> Advances the momentum and the attitude matrix of one body.
     subroutine flow_matrix(body, h, m, a, stat)
         type(rigid_body), intent(in) :: body
-        real(wp), intent(in) :: h
-        real(wp), intent(inout) :: m(3)
-        real(wp), intent(inout) :: a(3, 3)
+        real(wp), intent(in) :: h               !! time, any sign
+        real(wp), intent(inout) :: m(3)         !! body angular momentum
+        real(wp), intent(inout) :: a(3, 3)      !! attitude, body to space
         integer, intent(out), optional :: stat
-        real(wp) :: q(4)
+        real(wp) :: q(4), change(3, 3)
         integer :: code
 
-        code = status_bad_attitude
         if (all(ieee_is_finite(a))) then
             q = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-            call step(body, h, m, q, 1, code)
-            if (code == status_ok) a = matmul(a, quat_to_matrix(q))
+            call flow_quaternion(body, h, m, q, code)
+            if (code == status_ok) then
+                ! E(q) - 1 = 2 q0 hat(q) + 2 hat(q)^2, small when the step is.
+                change(1, 1) = -2*(q(3)*q(3) + q(4)*q(4))
+                change(2, 1) = 2*(q(2)*q(3) + q(1)*q(4))
+                change(3, 1) = 2*(q(2)*q(4) - q(1)*q(3))
+                change(1, 2) = 2*(q(2)*q(3) - q(1)*q(4))
+                change(2, 2) = -2*(q(2)*q(2) + q(4)*q(4))
+                change(3, 2) = 2*(q(3)*q(4) + q(1)*q(2))
+                change(1, 3) = 2*(q(2)*q(4) + q(1)*q(3))
+                change(2, 3) = 2*(q(3)*q(4) - q(1)*q(2))
+                change(3, 3) = -2*(q(2)*q(2) + q(3)*q(3))
+                a = a + matmul(a, change)
+            end if
+        else
+            code = status_bad_attitude
         end if
         call conclude(code, 'free_flow', stat)
     end subroutine flow_matrix
 
-    !> Momenta m(3, n) of n equal bodies after the time h, in place.
+    !> Advances the momenta of n equal bodies.
     subroutine flow_momenta(body, h, m, stat)
         type(rigid_body), intent(in) :: body
         real(wp), intent(in) :: h
-        real(wp), intent(inout) :: m(:, :)
+        real(wp), intent(inout), contiguous :: m(:, :)      !! (3, n)
         integer, intent(out), optional :: stat
-        real(wp) :: q(4)
-        integer :: code, i, one
+        integer :: code
 
-        code = status_bad_count
-        if (size(m, 1) == 3) then
-            code = status_ok
-            do i = 1, size(m, 2)
-                q = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-                call step(body, h, m(:, i), q, 0, one)
-                if (one /= status_ok) code = one
-            end do
-        end if
+        call flow_many([body], h, m, code)
         call conclude(code, 'free_flow', stat)
     end subroutine flow_momenta
 
-    !> Momenta m(3, n) and attitudes q(4, n) of n equal bodies after the time h, in place.
+    !> Advances the momenta and attitudes of n equal bodies. A body that is refused keeps its state and the
+    !> others go on; `stat` then tells why (the largest code, if there are several).
     subroutine flow_quaternions(body, h, m, q, stat)
         type(rigid_body), intent(in) :: body
         real(wp), intent(in) :: h
-        real(wp), intent(inout) :: m(:, :)
-        real(wp), intent(inout) :: q(:, :)
+        real(wp), intent(inout), contiguous :: m(:, :)      !! (3, n)
+        real(wp), intent(inout), contiguous :: q(:, :)      !! (4, n)
         integer, intent(out), optional :: stat
-        integer :: code, i, one
+        integer :: code
 
-        code = status_bad_count
-        if (size(m, 1) == 3 .and. size(q, 1) == 4 .and. size(m, 2) == size(q, 2)) then
-            code = status_ok
-            do i = 1, size(m, 2)
-                call step(body, h, m(:, i), q(:, i), 1, one)
-                if (one /= status_ok) code = one
-            end do
-        end if
+        call flow_many([body], h, m, code, q)
         call conclude(code, 'free_flow', stat)
     end subroutine flow_quaternions
 
-    !> Momenta m(3, n) of the bodies body(n) after the time h, in place.
-    subroutine flow_momenta_bodies(body, h, m, stat)
-        type(rigid_body), intent(in) :: body(:)
+    !> Advances the momenta of the n bodies body(:).
+    subroutine flow_momenta_of_bodies(body, h, m, stat)
+        type(rigid_body), intent(in) :: body(:)             !! (n)
         real(wp), intent(in) :: h
-        real(wp), intent(inout) :: m(:, :)
+        real(wp), intent(inout), contiguous :: m(:, :)      !! (3, n)
         integer, intent(out), optional :: stat
-        real(wp) :: q(4)
-        integer :: code, i, one
+        integer :: code
 
         code = status_bad_count
-        if (size(m, 1) == 3 .and. size(m, 2) == size(body)) then
-            code = status_ok
-            do i = 1, size(m, 2)
-                q = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-                call step(body(i), h, m(:, i), q, 0, one)
-                if (one /= status_ok) code = one
-            end do
-        end if
+        if (size(body) == size(m, 2)) call flow_many(body, h, m, code)
         call conclude(code, 'free_flow', stat)
-    end subroutine flow_momenta_bodies
+    end subroutine flow_momenta_of_bodies
 
-    !> Momenta m(3, n) and attitudes q(4, n) of the bodies body(n) after the time h, in place.
-    subroutine flow_quaternions_bodies(body, h, m, q, stat)
-        type(rigid_body), intent(in) :: body(:)
+    !> Advances the momenta and attitudes of the n bodies body(:).
+    subroutine flow_quaternions_of_bodies(body, h, m, q, stat)
+        type(rigid_body), intent(in) :: body(:)             !! (n)
         real(wp), intent(in) :: h
-        real(wp), intent(inout) :: m(:, :)
-        real(wp), intent(inout) :: q(:, :)
+        real(wp), intent(inout), contiguous :: m(:, :)      !! (3, n)
+        real(wp), intent(inout), contiguous :: q(:, :)      !! (4, n)
         integer, intent(out), optional :: stat
-        integer :: code, i, one
+        integer :: code
 
         code = status_bad_count
-        if (size(m, 1) == 3 .and. size(q, 1) == 4 .and. size(m, 2) == size(q, 2) &
-            .and. size(m, 2) == size(body)) then
-            code = status_ok
-            do i = 1, size(m, 2)
-                call step(body(i), h, m(:, i), q(:, i), 1, one)
-                if (one /= status_ok) code = one
-            end do
-        end if
+        if (size(body) == size(m, 2)) call flow_many(body, h, m, code, q)
         call conclude(code, 'free_flow', stat)
-    end subroutine flow_quaternions_bodies
+    end subroutine flow_quaternions_of_bodies
 
-    !> One step with its checks; the principal rotation is folded in and out.
-    subroutine step(body, h, m, q, mode, code)
-        type(rigid_body), intent(in) :: body
+    !> Many bodies in blocks, one per SIMD lane; body(:) holds one body for all or one for each. The blocks are
+    !> independent: with -fopenmp they are shared among the threads.
+    subroutine flow_many(body, h, m, code, q)
+        type(rigid_body), intent(in) :: body(:)
         real(wp), intent(in) :: h
-        real(wp), intent(inout) :: m(3), q(4)
-        integer, intent(in) :: mode
+        real(wp), intent(inout), contiguous :: m(:, :)
         integer, intent(out) :: code
+        real(wp), intent(inout), contiguous, optional :: q(:, :)
+        type(block_of_bodies) :: bodies
+        integer :: n, first, last, refused
 
-        code = body%status
-        if (code /= status_ok) return
-        if (.not. ieee_is_finite(h)) then
-            code = status_bad_time
-        else if (.not. all(ieee_is_finite(m))) then
-            code = status_bad_momentum
-        else if (.not. all(ieee_is_finite(q))) then
-            code = status_bad_attitude
+        code = status_bad_count
+        n = size(m, 2)
+        if (size(m, 1) /= 3) return
+        if (present(q)) then
+            if (size(q, 1) /= 4 .or. size(q, 2) /= n) return
         end if
+        code = status_ok
+        if (size(body) == 1) code = body(1)%status
+        if (code == status_ok .and. .not. ieee_is_finite(h)) code = status_bad_time
         if (code /= status_ok) return
-        if (norm3(m) <= 0.0_wp) return
-        if (body%turned) then
-            m = quat_rotate(quat_conjugate(body%axes_q), m)
-            q = quat_product(q, body%axes_q)
-            call flow_core(body, h, m, q, mode)
-            m = quat_rotate(body%axes_q, m)
-            q = quat_product(q, quat_conjugate(body%axes_q))
+        refused = status_ok
+        !$omp parallel do if (n >= 64*lanes) private(bodies, last) reduction(max: refused) schedule(static)
+        do first = 1, n, lanes
+            last = min(first + lanes - 1, n)
+            if (present(q)) then
+                call load_block(body, first, last, h, m, bodies, q)
+                call flow_block(bodies, 0.5_wp*h, .true.)
+                call store_block(body, first, last, h, bodies, m, refused, q)
+            else
+                call load_block(body, first, last, h, m, bodies)
+                call flow_block(bodies, 0.5_wp*h, .false.)
+                call store_block(body, first, last, h, bodies, m, refused)
+            end if
+        end do
+        !$omp end parallel do
+        code = refused
+    end subroutine flow_many
+
+    !> Bodies first to last into the lanes of a block, in sorted axes; lanes that hold no plain state rest.
+    subroutine load_block(body, first, last, h, m, bodies, q)
+        type(rigid_body), intent(in) :: body(:)
+        integer, intent(in) :: first, last
+        real(wp), intent(in) :: h
+        real(wp), intent(in), contiguous :: m(:, :)
+        type(block_of_bodies), intent(out) :: bodies
+        real(wp), intent(in), contiguous, optional :: q(:, :)
+        real(wp) :: parity, largest(lanes)
+        integer :: l, k, i1, i2, i3, count
+        logical :: usable
+
+        count = last - first + 1
+        if (count < lanes) then
+            bodies%m = 0.0_wp
+            bodies%q = 0.0_wp
+        end if
+        bodies%served = 0
+        if (size(body) == 1) then
+            bodies%alpha = body(1)%alpha
+            bodies%beta = body(1)%beta
+            bodies%gamma = body(1)%gamma
+            bodies%a1 = body(1)%a(1)
+            bodies%a3 = body(1)%a(3)
+            ! Column of axis j in the block: the inverse of the sorting.
+            i1 = findloc_of(body(1)%order, 1)
+            i2 = findloc_of(body(1)%order, 2)
+            i3 = findloc_of(body(1)%order, 3)
+            parity = body(1)%parity
+            do l = 1, count
+                bodies%m(l, i1) = parity*m(1, first + l - 1)
+                bodies%m(l, i2) = parity*m(2, first + l - 1)
+                bodies%m(l, i3) = parity*m(3, first + l - 1)
+            end do
+            if (present(q)) then
+                do l = 1, count
+                    bodies%q(l, 0) = q(1, first + l - 1)
+                    bodies%q(l, i1) = parity*q(2, first + l - 1)
+                    bodies%q(l, i2) = parity*q(3, first + l - 1)
+                    bodies%q(l, i3) = parity*q(4, first + l - 1)
+                end do
+            end if
         else
-            call flow_core(body, h, m, q, mode)
+            bodies%alpha = 0.0_wp
+            bodies%beta = 0.0_wp
+            bodies%gamma = 0.0_wp
+            bodies%a1 = 0.0_wp
+            bodies%a3 = 0.0_wp
+            do l = 1, count
+                k = first + l - 1
+                bodies%alpha(l) = body(k)%alpha
+                bodies%beta(l) = body(k)%beta
+                bodies%gamma(l) = body(k)%gamma
+                bodies%a1(l) = body(k)%a(1)
+                bodies%a3(l) = body(k)%a(3)
+                bodies%m(l, :) = body(k)%parity*m(body(k)%order, k)
+                if (present(q)) then
+                    bodies%q(l, 0) = q(1, k)
+                    bodies%q(l, 1:3) = body(k)%parity*q(1 + body(k)%order, k)
+                end if
+            end do
         end if
-    end subroutine step
+        largest = 0.0_wp
+        do l = 1, count
+            largest(l) = abs(bodies%m(l, 1)) + abs(bodies%m(l, 2)) + abs(bodies%m(l, 3))
+        end do
+        do l = 1, count
+            k = merge(1, first + l - 1, size(body) == 1)
+            usable = ieee_is_finite(largest(l))
+            if (usable) usable = largest(l) < plain_largest .and. largest(l) > plain_smallest &
+                .and. abs(body(k)%a(1)*h) < plain_largest .and. body(k)%status == status_ok .and. .not. body(k)%turned
+            if (usable .and. present(q)) then
+                largest(l) = abs(bodies%q(l, 0)) + abs(bodies%q(l, 1)) + abs(bodies%q(l, 2)) + abs(bodies%q(l, 3))
+                usable = ieee_is_finite(largest(l))
+                if (usable) usable = largest(l) > plain_smallest
+            end if
+            if (usable) then
+                bodies%served(l) = 1
+            else
+                bodies%m(l, :) = 0.0_wp
+                bodies%q(l, :) = 0.0_wp
+            end if
+        end do
+    end subroutine load_block
+
+    !> Lanes back to bodies first to last; those the block did not serve go one by one.
+    subroutine store_block(body, first, last, h, bodies, m, refused, q)
+        type(rigid_body), intent(in) :: body(:)
+        integer, intent(in) :: first, last
+        real(wp), intent(in) :: h
+        type(block_of_bodies), intent(in) :: bodies
+        real(wp), intent(inout), contiguous :: m(:, :)
+        integer, intent(inout) :: refused
+        real(wp), intent(inout), contiguous, optional :: q(:, :)
+        real(wp) :: parity
+        integer :: l, k, i1, i2, i3, count, code
+
+        count = last - first + 1
+        if (size(body) == 1 .and. all(bodies%served(1:count) == 1)) then
+            i1 = findloc_of(body(1)%order, 1)
+            i2 = findloc_of(body(1)%order, 2)
+            i3 = findloc_of(body(1)%order, 3)
+            parity = body(1)%parity
+            do l = 1, count
+                m(1, first + l - 1) = parity*bodies%m(l, i1)
+                m(2, first + l - 1) = parity*bodies%m(l, i2)
+                m(3, first + l - 1) = parity*bodies%m(l, i3)
+            end do
+            if (present(q)) then
+                do l = 1, count
+                    q(1, first + l - 1) = bodies%q(l, 0)
+                    q(2, first + l - 1) = parity*bodies%q(l, i1)
+                    q(3, first + l - 1) = parity*bodies%q(l, i2)
+                    q(4, first + l - 1) = parity*bodies%q(l, i3)
+                end do
+            end if
+            return
+        end if
+        do l = 1, count
+            k = first + l - 1
+            associate (one => body(merge(1, k, size(body) == 1)))
+                if (bodies%served(l) == 1) then
+                    m(one%order, k) = one%parity*bodies%m(l, :)
+                    if (present(q)) then
+                        q(1, k) = bodies%q(l, 0)
+                        q(1 + one%order, k) = one%parity*bodies%q(l, 1:3)
+                    end if
+                else if (present(q)) then
+                    call flow_quaternion(one, h, m(:, k), q(:, k), code)
+                    refused = max(refused, code)
+                else
+                    call flow_momentum(one, h, m(:, k), code)
+                    refused = max(refused, code)
+                end if
+            end associate
+        end do
+    end subroutine store_block
+
+    !> Place of a value among three (findloc is not in Fortran 2008).
+    pure function findloc_of(values, value) result(place)
+        integer, intent(in) :: values(3), value
+        integer :: place
+
+        place = 1
+        if (values(2) == value) place = 2
+        if (values(3) == value) place = 3
+    end function findloc_of
 
 end module frb_free_flow
