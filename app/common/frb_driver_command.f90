@@ -32,6 +32,7 @@ module frb_driver_command
         !> C: ends the program with an exit code and, unlike `stop`, without a word.
         subroutine c_exit(code) bind(c, name='exit')
             import :: c_int
+            implicit none
             integer(c_int), value :: code
         end subroutine c_exit
     end interface

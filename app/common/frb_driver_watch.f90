@@ -39,6 +39,7 @@ module frb_driver_watch
         !> POSIX: 1 if a file descriptor is a terminal.
         function c_isatty(descriptor) bind(c, name='isatty') result(terminal)
             import :: c_int
+            implicit none
             integer(c_int), value :: descriptor
             integer(c_int) :: terminal
         end function c_isatty
@@ -123,8 +124,9 @@ contains
         end if
         self%norm_drift = max(self%norm_drift, abs(norm3(m) - self%norm0))
         self%space_drift = max(self%space_drift, norm3(space - self%space0))
-        if (self%torque) &
+        if (self%torque) then
             self%vertical_drift = max(self%vertical_drift, abs(dot_product(self%up, space - self%space0)))
+        end if
         half = merge(1, 2, self%done <= self%steps/2)
         self%energy_drift(half) = max(self%energy_drift(half), abs(kinetic + potential - self%energy0))
         self%defect = max(self%defect, defect)
@@ -143,7 +145,8 @@ contains
         if (self%last_shown > self%run_begun) write (error_unit, '(a)') achar(13)//'steps done: all        '
         size_of_m = positive(self%norm0)
         write (output_unit, '(a)') title
-        write (output_unit, '(a,i0,a,g0.6)') '  steps                      ', self%steps, ' of h = ', h
+        write (output_unit, '(a,i0,2(a,es11.4))') '  steps                      ', self%steps, ' of h =', h, &
+            ', to t =', self%steps*h
         write (output_unit, '(a,es10.3,a)') '  time per step              ', &
             real(self%ticks, wp)/real(rate, wp)/max(1, self%done), ' s'
         write (output_unit, '(a,es10.3,a)') '  time of the run            ', &
@@ -173,7 +176,7 @@ contains
             character(25) :: padded
 
             padded = name
-            write (output_unit, '(a,es10.3)') '    '//padded//'', value
+            write (output_unit, '(a,es10.3)') '    '//padded, value
         end subroutine line
 
     end subroutine report
@@ -196,8 +199,8 @@ contains
         call system_clock(unused, rate)
         if (now - self%last_shown < rate) return
         self%last_shown = now
-        write (error_unit, '(a,i0,a,i0)', advance='no') achar(13)//'steps done: ', self%done, ' of ', &
-                    self%steps
+        write (error_unit, '(a,i0,a,i0)', advance='no') achar(13)//'steps done: ', self%done, &
+            ' of ', self%steps
         flush (error_unit)
     end subroutine show_progress
 

@@ -106,13 +106,12 @@ contains
         select case (letter)
         case ('a')
             call file%read_numbers('a', values%a, error)
-            if (.not. allocated(error)) &
-                call check_sum(file, 'a', 2*sum(values%a(:7)) + values%a(8), '2 (a1 + ... + a7) + a8 = 1', &
-                            error)
+            if (allocated(error)) return
+            call check_sum(file, 'a', 2*sum(values%a(:7)) + values%a(8), '2 (a1 + ... + a7) + a8 = 1', error)
         case ('b')
             call file%read_numbers('b', values%b, error)
-            if (.not. allocated(error)) &
-                call check_sum(file, 'b', 2*sum(values%b), '2 (b1 + ... + b7) = 1', error)
+            if (allocated(error)) return
+            call check_sum(file, 'b', 2*sum(values%b), '2 (b1 + ... + b7) = 1', error)
         case ('h')
             call file%read_number('h', values%h, error)
             if (allocated(error)) return

@@ -43,7 +43,6 @@ contains
         class(number_file), intent(inout) :: self
         character(*), intent(in) :: path                    !! trailing blanks do not count
         character(:), allocatable, intent(out) :: error     !! allocated if it cannot be opened
-        character(200) :: reason
         integer :: io
 
         self%path = trim(path)
@@ -51,7 +50,7 @@ contains
         self%position = 1
         self%line_number = 0
         self%at_end = .false.
-        open (newunit=self%unit, file=self%path, status='old', action='read', iostat=io, iomsg=reason)
+        open (newunit=self%unit, file=self%path, status='old', action='read', iostat=io)
         if (io /= 0) error = self%path//': cannot be opened for reading'
     end subroutine open_for_reading
 
@@ -165,13 +164,12 @@ contains
         class(number_file), intent(inout) :: self
         character(:), allocatable, intent(out) :: error
         character(512) :: part
-        character(200) :: reason
         integer :: io, length, comment
 
         self%line = ''
         self%position = 1
         do
-            read (self%unit, '(a)', advance='no', size=length, iostat=io, iomsg=reason) part
+            read (self%unit, '(a)', advance='no', size=length, iostat=io) part
             if (is_iostat_end(io)) then
                 self%at_end = .true.
                 return

@@ -34,6 +34,7 @@ module frb_out_files
         !> POSIX: gives a file another name in one step, replacing a file that had it; 0 if done.
         function c_rename(old, new) bind(c, name='rename') result(failed)
             import :: c_char, c_int
+            implicit none
             character(kind=c_char), intent(in) :: old(*), new(*)
             integer(c_int) :: failed
         end function c_rename
@@ -47,14 +48,13 @@ contains
         character(*), intent(in) :: path                    !! trailing blanks do not count
         character(:), allocatable, intent(out) :: error     !! allocated if the file cannot be made
         integer :: io
-        character(200) :: reason
 
         self%path = trim(path)
         self%length = 0
         self%temporary = self%path//'.part'
         if (index(self%path, '/dev/') == 1) self%temporary = self%path
         open (newunit=self%unit, file=self%temporary, status='unknown', action='write', form='formatted', &
-              recl=100000, iostat=io, iomsg=reason)
+              iostat=io)
         if (io /= 0) error = self%path//': cannot be opened for writing'
     end subroutine open_for_writing
 
@@ -79,6 +79,7 @@ contains
 
         if (self%temporary == self%path) then
             close (self%unit, iostat=io)
+            if (io /= 0) error = self%path//': cannot be written'
             return
         end if
         ! Not every run-time library reports a full disk: only the length on the disk tells.
