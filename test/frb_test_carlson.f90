@@ -22,7 +22,7 @@ contains
         type(table_entry), allocatable :: table(:)
         real(wp), allocatable :: x(:, :), v(:), errors(:)
 
-        call t%open_suite('carlson', 25)
+        call t%open_suite('carlson', 26)
         call read_table(table)
         call columns_of(table, 'rf', x, v)
         call t%ok('table-holds-rf', size(v) >= 45)
@@ -95,10 +95,33 @@ contains
                   all(ieee_is_nan([rf(nan, 1.0_wp, 1.0_wp), rf(1.0_wp, inf, 1.0_wp), rc(nan, 1.0_wp), &
                                    rc(1.0_wp, -inf), rj(1.0_wp, 1.0_wp, 1.0_wp, nan), &
                                    rj(inf, 1.0_wp, 1.0_wp, 1.0_wp), rd(1.0_wp, 1.0_wp, nan)])))
+        call t%ok('arguments-of-extreme-size-give-a-number', extremes_are_accepted())
         call t%ok('rj-beyond-the-largest-number-is-infinite', &
                   .not. ieee_is_finite(rj(1.0e-300_wp, 1.0e-300_wp, 1.0e-300_wp, 1.0e-300_wp)) .and. &
                   .not. ieee_is_nan(rj(1.0e-300_wp, 1.0e-300_wp, 1.0e-300_wp, 1.0e-300_wp)))
     end subroutine refusals
+
+    !> Every combination of extreme and plain arguments in the domain gives a value above zero, without an
+    !> exception (in a build that traps them).
+    function extremes_are_accepted() result(accepted)
+        real(wp), parameter :: sizes(7) = [4.9406564584124654e-324_wp, 1.0e-200_wp, 1.0e-60_wp, 1.0_wp, &
+                                           1.0e100_wp, 1.0e200_wp, huge(1.0_wp)]
+        logical :: accepted
+        integer :: i, j, l
+
+        accepted = .true.
+        do i = 1, size(sizes)
+            do j = 1, size(sizes)
+                accepted = accepted .and. rc(sizes(i), sizes(j)) > 0.0_wp
+                do l = 1, size(sizes)
+                    accepted = accepted .and. rf(0.0_wp, sizes(i), sizes(j)) > 0.0_wp &
+                        .and. rf(sizes(i), sizes(j), sizes(l)) > 0.0_wp &
+                        .and. rj(0.0_wp, sizes(i), sizes(j), sizes(l)) >= 0.0_wp &
+                        .and. rj(1.0_wp, sizes(i), sizes(j), sizes(l)) >= 0.0_wp
+                end do
+            end do
+        end do
+    end function extremes_are_accepted
 
     !> Largest relative error; NaN counts as huge.
     pure function worst(got, expected) result(error)

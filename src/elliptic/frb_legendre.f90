@@ -52,8 +52,8 @@ contains
     !> Pi(phi2, n, k) - Pi(phi1, n, k), the integral from phi1 to phi2, any amplitudes.
     !> Whole half turns are counted by the complete integral, the rest is a difference of two incomplete ones.
     !> Domain: phi1, phi2 finite, |k| <= 1, n < 1 (or n sin**2 < 1 on the whole way); outside: NaN.
-    !> An integral across pi/2 + j pi at k = 1 or nc = 0, or one beyond the largest number, is Infinity with the
-    !> sign of phi2 - phi1.
+    !> An integral across pi/2 + j pi at k = 1 or nc = 0, or one beyond the largest number, is Infinity with
+    !> the sign of phi2 - phi1.
     !> Accuracy: 8 epsilon (|Pi(phi1)| + |Pi(phi2)|), and the change that half an ulp of the amplitudes makes;
     !> checked by legendre: difference-of-any-amplitudes-agrees-with-table.
     !> Source: section 3.4 (`ellint_pi`).
