@@ -22,7 +22,7 @@ contains
         type(table_entry), allocatable :: table(:)
         real(wp), allocatable :: x(:, :), v(:), errors(:)
 
-        call t%open_suite('carlson', 26)
+        call t%open_suite('carlson', 28)
         call read_table(table)
         call columns_of(table, 'rf', x, v)
         call t%ok('table-holds-rf', size(v) >= 45)
@@ -42,6 +42,7 @@ contains
         call t%ok('table-holds-rd', size(v) >= 40)
         call t%at_most('rd-agrees-with-table', worst(rd(x(:, 1), x(:, 2), x(:, 3)), v), rj_bound)
         call identities(t)
+        call series_at_their_radius(t)
         call refusals(t)
         call t%close_suite()
     end subroutine test_carlson
@@ -77,6 +78,35 @@ contains
         call t%close_to('rf-and-rj-together-are-rf-and-rj', [first, third], [rf(x, y, z), rj(x, y, z, p)], &
                         rj_bound*third)
     end subroutine identities
+
+    !> Arguments just close enough for the series alone, against one duplication more, which brings them four
+    !> times closer.
+    subroutine series_at_their_radius(t)
+        type(tally), intent(inout) :: t
+        real(wp), parameter :: far(4, 4) = reshape([-1, -1, 0, 1, 1, 1, 0, -1, &
+                                                   -1, -1, -1, 1, 1, -1, 0, 0]*1.0_wp, &
+                                                   [4, 4])
+        real(wp) :: x(3), p, lambda, d, delta, first, third
+        integer :: i
+
+        first = 0.0_wp
+        third = 0.0_wp
+        do i = 1, 4
+            x = 1 + 0.05_wp*far(1:3, i)
+            lambda = sqrt(x(1)*x(2)) + sqrt(x(1)*x(3)) + sqrt(x(2)*x(3))
+            first = max(first, abs(2*rf(x(1) + lambda, x(2) + lambda, x(3) + lambda) &
+                                   /rf(x(1), x(2), x(3)) - 1))
+            x = 1 + 0.0195_wp*far(1:3, i)
+            p = 1 + 0.0195_wp*far(4, i)
+            lambda = sqrt(x(1)*x(2)) + sqrt(x(1)*x(3)) + sqrt(x(2)*x(3))
+            d = product(sqrt(p) + sqrt(x))
+            delta = product(p - x)
+            third = max(third, abs((2*rj(x(1) + lambda, x(2) + lambda, x(3) + lambda, p + lambda) &
+                                    + 6/d*rc(1.0_wp, 1 + delta/d**2))/rj(x(1), x(2), x(3), p) - 1))
+        end do
+        call t%at_most('series-of-rf-is-sharp-at-its-radius', first, rf_bound)
+        call t%at_most('series-of-rj-is-sharp-at-its-radius', third, rj_bound)
+    end subroutine series_at_their_radius
 
     subroutine refusals(t)
         type(tally), intent(inout) :: t
