@@ -18,7 +18,8 @@ module frb_test_steps
 
     !> Median and maximum of the scores in every group: of the momentum and the matrix, of the quaternion.
     real(wp), parameter :: units_matrix(2) = [1.0_wp, 4.0_wp]
-    real(wp), parameter :: units_frame(2, 3) = reshape([2.0_wp, 4.0_wp, 2.0_wp, 6.0_wp, 2.0_wp, 6.0_wp], [2, 3])
+    real(wp), parameter :: units_frame(2, 3) = reshape([2.0_wp, 4.0_wp, 2.0_wp, 6.0_wp, &
+                                                           2.0_wp, 6.0_wp], [2, 3])
     real(wp), parameter :: orthogonal_to = 1.0e-14_wp
 
     real(wp), parameter :: no_turn(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
@@ -30,7 +31,7 @@ contains
     subroutine test_steps(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('steps', 119)
+        call t%open_suite('steps', 121)
         call check_reference_cases(t)
         call check_published_ends(t)
         call check_special_motions(t)
@@ -287,6 +288,10 @@ contains
         end do
         call quat_step(m, q, 1.0_wp, i0, m0, [0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], stat=stat)
         call t%equal('quaternion-step-refuses-zero-quaternion', stat, status_bad_attitude)
+        call quat_step(m, q, 1.0_wp, i0, m0, huge(1.0_wp)*no_turn, stat=stat)
+        call t%equal('quaternion-step-refuses-absurd-quaternion', stat, status_bad_attitude)
+        call frb_step(m, a, 1.0_wp, i0, m0, -huge(1.0_wp)*identity, stat=stat)
+        call t%equal('matrix-step-refuses-absurd-matrix', stat, status_bad_attitude)
         call frb_step(m, a, 1.0_wp, i0, m0, identity, -1, stat)
         call t%equal('matrix-step-refuses-negative-number-of-points', stat, status_bad_count)
         call frb_step(m, a, 1.0_wp, i0, m0, identity, huge(1), stat)

@@ -10,9 +10,12 @@ module frb_matrix_step
     implicit none
     private
 
-    public :: frb_step, most_points
+    public :: frb_step, most_points, largest_attitude
 
     integer, parameter :: most_points = 1000    !! largest number of Gauss points of a step
+
+    !> No element of an attitude may be larger: a turn of it could overflow.
+    real(wp), parameter :: largest_attitude = 1.0e300_wp
 
 contains
 
@@ -32,12 +35,13 @@ contains
     !> maximum below 4 in every group, for m and Q; Q orthogonal to 1e-14 (checked by steps). In a chain of N
     !> steps |m| and the energy stay to 1e-13, Q^T Q leaves the identity by about N 5e-17.
     !> The sensitivity itself grows near the middle axis and the separatrix: once h covers a half turn, m and
-    !> Q lose about log10(1/(1 - k**2)) of their 16 digits, all of them for 1 - k**2 below 1e-16, where m stays
+    !> Q lose about log10(1/(1 - k**2)) of 16 digits, all of them for 1 - k**2 below 1e-16, where m stays
     !> on the orbit, Q orthogonal and Q m constant. With np >= 1 Q also loses digits, and needs a smaller h,
     !> where m' is small: the frame turns fast there.
     !>
     !> Errors: status_bad_moments (not positive and finite), status_bad_momentum, status_bad_time,
-    !> status_bad_attitude (not finite), status_bad_count (np < 0 or np > 1000). The output is then the input.
+    !> status_bad_attitude (not finite, or beyond 1e300), status_bad_count (np < 0 or np > 1000). The output
+    !> is then the input.
     subroutine frb_step(Piout, Qout, h, aInert, Piin, Qin, np, stat)
         ! inout and target, because output and input may be one variable: neither may a compiler assume that
         ! they are not, nor may the input be undefined on entry. Input is read before output is written.
@@ -59,8 +63,13 @@ contains
         if (present(np)) points = np
         call normal_form(h, aInert, start_m, motion, code)
         if (code == status_ok) then
-            if (.not. all(ieee_is_finite(start_q))) code = status_bad_attitude
-            if (points < 0 .or. points > most_points) code = status_bad_count
+            if (.not. all(ieee_is_finite(start_q))) then
+                code = status_bad_attitude
+            else if (maxval(abs(start_q)) > largest_attitude) then
+                code = status_bad_attitude
+            else if (points < 0 .or. points > most_points) then
+                code = status_bad_count
+            end if
         end if
         if (code /= status_ok) then
             Piout = start_m

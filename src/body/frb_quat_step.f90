@@ -1,7 +1,7 @@
 !> Algorithm 2: the free rigid body with the attitude as a quaternion, in the three frames of section 1.4.
 module frb_quat_step
     use frb_kinds, only: wp
-    use frb_matrix_step, only: most_points
+    use frb_matrix_step, only: most_points, largest_attitude
     use frb_paper_angle, only: exact_angle, quadrature_angle, angle_by_middle_axis, angle_by_outer_axes
     use frb_paper_momentum, only: momentum_step, momentum_by_addition, momentum_by_phase
     use frb_paper_motion, only: paper_motion, normal_form, simple_motion, add_momentum, motion_elliptic
@@ -41,8 +41,8 @@ contains
     !> order shows for smaller h only.
     !>
     !> Errors: status_bad_moments (not positive and finite), status_bad_momentum, status_bad_time,
-    !> status_bad_attitude (not finite, or zero), status_bad_count (np < 0 or np > 1000), status_bad_option
-    !> (another frame). The output is then the input.
+    !> status_bad_attitude (not finite, zero, or beyond 1e300), status_bad_count (np < 0 or np > 1000),
+    !> status_bad_option (another frame). The output is then the input.
     subroutine quat_step(Piout, qout, h, aInert, Piin, qin, np, frame, stat)
         ! inout and target, because output and input may be one variable: neither may a compiler assume that
         ! they are not, nor may the input be undefined on entry. Input is read before output is written.
@@ -69,7 +69,7 @@ contains
         if (code == status_ok) then
             if (.not. all(ieee_is_finite(start_q))) then
                 code = status_bad_attitude
-            else if (max(abs(start_q(1)), abs(start_q(2)), abs(start_q(3)), abs(start_q(4))) <= 0.0_wp) then
+            else if (maxval(abs(start_q)) <= 0.0_wp .or. maxval(abs(start_q)) > largest_attitude) then
                 code = status_bad_attitude
             else if (points < 0 .or. points > most_points) then
                 code = status_bad_count
