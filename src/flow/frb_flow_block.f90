@@ -11,7 +11,7 @@ module frb_flow_block
 
     public :: lanes, block_of_bodies, flow_block
 
-    integer, parameter :: lanes = 64    !! bodies in a block: its arrays fit in the first-level cache
+    integer, parameter :: lanes = 32    !! bodies in a block: a few vectors, and small enough for memory to keep up
 
     !> A block in sorted principal axes, with the parity of the sorting folded into m and the vector part of q.
     type :: block_of_bodies
