@@ -40,8 +40,8 @@ contains
     !> where m' is small: the frame turns fast there.
     !>
     !> Errors: status_bad_moments (not positive and finite), status_bad_momentum, status_bad_time,
-    !> status_bad_attitude (not finite, or beyond 1e300), status_bad_count (np < 0 or np > 1000). The output
-    !> is then the input.
+    !> status_bad_attitude (not finite, or beyond 1e300), status_bad_count (np < 0 or np > 1000),
+    !> status_lapack_failed (no nodes for np > 10). The output is then the input.
     subroutine frb_step(Piout, Qout, h, aInert, Piin, Qin, np, stat)
         ! inout and target, because output and input may be one variable: neither may a compiler assume that
         ! they are not, nor may the input be undefined on entry. Input is read before output is written.
@@ -71,16 +71,19 @@ contains
                 code = status_bad_count
             end if
         end if
-        if (code /= status_ok) then
-            Piout = start_m
-            Qout = start_q
-        else if (motion%kind == motion_elliptic) then
-            call turn_elliptic(motion, points, start_q, change, Qout, code)
+        if (code == status_ok) then
+            if (motion%kind == motion_elliptic) then
+                call turn_elliptic(motion, points, start_q, change, Qout, code)
+            else
+                call simple_motion(motion, change, q)
+                call turn_simple(motion, start_q, quat_to_matrix(q), Qout)
+            end if
+        end if
+        if (code == status_ok) then
             Piout = add_momentum(motion, start_m, change)
         else
-            call simple_motion(motion, change, q)
-            call turn_simple(motion, start_q, quat_to_matrix(q), Qout)
-            Piout = add_momentum(motion, start_m, change)
+            Piout = start_m
+            Qout = start_q
         end if
         call conclude(code, 'frb_step', stat)
     end subroutine frb_step

@@ -42,7 +42,8 @@ contains
     !>
     !> Errors: status_bad_moments (not positive and finite), status_bad_momentum, status_bad_time,
     !> status_bad_attitude (not finite, zero, or beyond 1e300), status_bad_count (np < 0 or np > 1000),
-    !> status_bad_option (another frame). The output is then the input.
+    !> status_bad_option (another frame), status_lapack_failed (no nodes for np > 10). The output is then the
+    !> input.
     subroutine quat_step(Piout, qout, h, aInert, Piin, qin, np, frame, stat)
         ! inout and target, because output and input may be one variable: neither may a compiler assume that
         ! they are not, nor may the input be undefined on entry. Input is read before output is written.
@@ -83,6 +84,8 @@ contains
             else
                 call simple_motion(motion, change, turn)
             end if
+        end if
+        if (code == status_ok) then
             if (.not. motion%sorted) turn(1 + motion%order) = motion%parity*turn(2:4)
             Piout = add_momentum(motion, start_m, change)
             qout = quat_product(start_q, turn)
