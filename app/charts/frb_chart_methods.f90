@@ -9,7 +9,8 @@ module frb_chart_methods
     implicit none
     private
 
-    public :: method, catalogue, find_method, known, style, escaped, advance, advance_once
+    public :: method, catalogue, find_method, known, style, escaped, advance, advance_once, constants, &
+        new_constants
     public :: family_flow, family_batch, family_momentum, family_matrix, family_paper_q, family_paper_a
     public :: family_dmv, family_rotations, family_rk4, family_dp
 
@@ -38,7 +39,22 @@ module frb_chart_methods
         integer :: width = 2
     end type method
 
+    !> What the free flow and the discrete Moser-Veselov method form once per body.
+    type :: constants
+        type(rigid_body) :: body
+        type(dmv_body) :: rival
+    end type constants
+
 contains
+
+    !> The constants of the body with the given moments.
+    pure function new_constants(moments) result(ready)
+        real(wp), intent(in) :: moments(3)
+        type(constants) :: ready
+
+        ready%body = rigid_body(moments)
+        ready%rival = new_dmv_body(moments)
+    end function new_constants
 
     !> Every method, in the order of the tables.
     function catalogue() result(methods)
@@ -175,7 +191,7 @@ contains
     !> Takes `nsteps` steps of h; body constants are set up once. NaN when the method refuses.
     !> The batch form advances as many copies of the body as there are columns in a small block and returns
     !> the last; the adaptive method takes as many of its own steps as each h needs.
-    subroutine advance(with, moments, h, nsteps, m, q, a)
+    subroutine advance(with, moments, h, nsteps, m, q, a, ready)
         type(method), intent(in) :: with
         real(wp), intent(in) :: moments(3)      !! I1, I2, I3
         real(wp), intent(in) :: h               !! step
@@ -183,42 +199,64 @@ contains
         real(wp), intent(inout) :: m(3)         !! body angular momentum
         real(wp), intent(inout) :: q(4)         !! attitude, body to space
         real(wp), intent(out), optional :: a(3, 3)  !! attitude matrix as the method left it, if it has one
-        integer, parameter :: copies = 8
-        type(rigid_body) :: body
+        type(constants), intent(in), optional :: ready  !! of the body, formed here when absent
+        type(constants) :: own
         real(wp) :: matrix(3, 3)
+        integer :: stat
+
+        if (present(ready)) then
+            call advance_ready(with, ready, moments, h, nsteps, m, q, matrix, stat)
+        else
+            own = new_constants(moments)
+            call advance_ready(with, own, moments, h, nsteps, m, q, matrix, stat)
+        end if
+        if (stat /= status_ok) then
+            m = ieee_value(m, ieee_quiet_nan)
+            q = ieee_value(q, ieee_quiet_nan)
+            matrix = ieee_value(matrix, ieee_quiet_nan)
+        end if
+        if (present(a)) a = matrix
+    end subroutine advance
+
+    !> The steps themselves.
+    subroutine advance_ready(with, ready, moments, h, nsteps, m, q, matrix, stat)
+        type(method), intent(in) :: with
+        type(constants), intent(in) :: ready
+        real(wp), intent(in) :: moments(3), h
+        integer, intent(in) :: nsteps
+        real(wp), intent(inout) :: m(3), q(4)
+        real(wp), intent(out) :: matrix(3, 3)
+        integer, intent(out) :: stat
+        integer, parameter :: copies = 8
         real(wp) :: many_m(3, copies), many_q(4, copies)
-        integer :: i, stat
+        integer :: i
 
         stat = status_ok
         matrix = 0.0_wp
         select case (with%family)
         case (family_flow)
-            body = rigid_body(moments)
             do i = 1, nsteps
-                call free_flow(body, h, m, q, stat)
+                call free_flow(ready%body, h, m, q, stat)
                 if (stat /= status_ok) exit
             end do
         case (family_momentum)
-            body = rigid_body(moments)
             do i = 1, nsteps
-                call free_flow(body, h, m, stat)
+                call free_flow(ready%body, h, m, stat)
                 if (stat /= status_ok) exit
             end do
         case (family_batch)
-            body = rigid_body(moments)
             many_m = spread(m, 2, copies)
             many_q = spread(q, 2, copies)
             do i = 1, nsteps
-                call free_flow(body, h, many_m, many_q, stat)
+                call free_flow(ready%body, h, many_m, many_q, stat)
                 if (stat /= status_ok) exit
             end do
             m = many_m(:, copies)
             q = many_q(:, copies)
         case (family_matrix)
-            body = rigid_body(moments)
             matrix = quat_to_matrix(q)
             do i = 1, nsteps
-                call free_flow(body, h, m, matrix, stat)
+                call free_flow(ready%body, h, m, matrix, stat)
                 if (stat /= status_ok) exit
             end do
             q = matrix_to_quat(matrix)
@@ -235,7 +273,7 @@ contains
             end do
             q = matrix_to_quat(matrix)
         case (family_dmv)
-            call dmv_steps(new_dmv_body(moments), with%option, h, nsteps, m, q)
+            call dmv_steps(ready%rival, with%option, h, nsteps, m, q)
         case (family_rotations)
             call rotation_steps(moments, with%option, h, nsteps, m, q)
         case (family_rk4)
@@ -251,13 +289,7 @@ contains
         case default
             stat = -1
         end select
-        if (stat /= status_ok) then
-            m = ieee_value(m, ieee_quiet_nan)
-            q = ieee_value(q, ieee_quiet_nan)
-            matrix = ieee_value(matrix, ieee_quiet_nan)
-        end if
-        if (present(a)) a = matrix
-    end subroutine advance
+    end subroutine advance_ready
 
     !> One step of an exact method, for a drift in a splitting.
     subroutine advance_once(with, moments, h, m, q, stat)

@@ -1,10 +1,11 @@
 !> The stopwatch of the charts: all methods in one process, repetition after repetition in turn, so that a
 !> disturbance hits all of them alike.
 module frb_chart_timing
-    use frb, only: wp, rigid_body, free_flow
-    use frb_chart_methods, only: method, advance, family_flow, family_batch, family_momentum, family_dmv
+    use frb, only: wp, free_flow
+    use frb_chart_methods, only: method, advance, constants, new_constants, family_flow, family_batch, &
+        family_momentum, family_dmv
     use frb_chart_output, only: settings, progress, random_direction
-    use frb_dmv, only: dmv_body, new_dmv_body, dmv_steps
+    use frb_dmv, only: dmv_steps
     use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
@@ -20,6 +21,7 @@ module frb_chart_timing
         integer :: nsteps = 1               !! steps per repetition
         integer :: threads = 1              !! of the batch form; more than one needs -fopenmp
         integer :: rounds = 1               !! times the nsteps are taken, each from the start
+        type(constants) :: ready            !! of the body, formed once
         real(wp), allocatable :: m0(:, :)   !! (3, bodies)
         real(wp), allocatable :: m(:, :)
         real(wp), allocatable :: q(:, :)
@@ -38,6 +40,7 @@ contains
 
         work%with = with
         work%moments = moments
+        work%ready = new_constants(moments)
         work%h = h
         work%bodies = bodies
         allocate (work%m0(3, bodies), work%m(3, bodies), work%q(4, bodies))
@@ -105,7 +108,8 @@ contains
             else
                 work%m(:, 1) = work%m0(:, 1)
                 work%q(:, 1) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-                call advance(work%with, work%moments, work%h, work%nsteps, work%m(:, 1), work%q(:, 1))
+                call advance(work%with, work%moments, work%h, work%nsteps, work%m(:, 1), work%q(:, 1), &
+                             ready=work%ready)
             end if
         end do
         finish = clock(work%threads)
@@ -140,44 +144,38 @@ contains
     subroutine advance_many(work)
         !$ use omp_lib, only: omp_set_num_threads
         type(workload), intent(inout) :: work
-        type(rigid_body) :: body
-        type(dmv_body) :: rival
         integer :: i, step, part, low, high
 
         !$ call omp_set_num_threads(work%threads)
         select case (work%with%family)
         case (family_batch)
-            body = rigid_body(work%moments)
             do step = 1, work%nsteps
                 if (work%threads == 1) then
-                    call free_flow(body, work%h, work%m, work%q)
+                    call free_flow(work%ready%body, work%h, work%m, work%q)
                 else
                     !$omp parallel do private(low, high) schedule(static, 1)
                     do part = 1, work%threads
                         low = 1 + int((part - 1)*int(work%bodies, int64)/work%threads)
                         high = int(part*int(work%bodies, int64)/work%threads)
-                        call free_flow(body, work%h, work%m(:, low:high), work%q(:, low:high))
+                        call free_flow(work%ready%body, work%h, work%m(:, low:high), work%q(:, low:high))
                     end do
                     !$omp end parallel do
                 end if
             end do
         case (family_flow)
-            body = rigid_body(work%moments)
             do step = 1, work%nsteps
                 do i = 1, work%bodies
-                    call free_flow(body, work%h, work%m(:, i), work%q(:, i))
+                    call free_flow(work%ready%body, work%h, work%m(:, i), work%q(:, i))
                 end do
             end do
         case (family_momentum)
-            body = rigid_body(work%moments)
             do step = 1, work%nsteps
-                call free_flow(body, work%h, work%m)
+                call free_flow(work%ready%body, work%h, work%m)
             end do
         case (family_dmv)
-            rival = new_dmv_body(work%moments)
             do step = 1, work%nsteps
                 do i = 1, work%bodies
-                    call dmv_steps(rival, work%with%option, work%h, 1, work%m(:, i), work%q(:, i))
+                    call dmv_steps(work%ready%rival, work%with%option, work%h, 1, work%m(:, i), work%q(:, i))
                 end do
             end do
         case default

@@ -7,6 +7,7 @@ program frb_charts
     use frb_chart_output, only: settings, say
     use frb_chart_precision, only: chart_work_precision, chart_growth
     use frb_chart_scale, only: chart_scale
+    use frb_chart_scenes, only: chart_scenes
     use frb_chart_top, only: chart_heavy_top, chart_torus
     use frb_chart_triangle, only: chart_triangle
     use, intrinsic :: iso_c_binding, only: c_int
@@ -22,7 +23,8 @@ program frb_charts
         end subroutine c_exit
     end interface
 
-    character(*), parameter :: names(*) = [character(16) :: 'speed', 'cost', 'work-precision', 'heavy-top', &
+    character(*), parameter :: names(*) = [character(16) :: 'speed', 'scenes', 'cost', 'work-precision', &
+        'heavy-top', &
         'failure', &
         'growth', 'triangle', 'scale', 'orbits']
     type(settings) :: options
@@ -69,6 +71,8 @@ program frb_charts
         select case (names(i))
         case ('speed')
             call chart_speed(options)
+        case ('scenes')
+            call chart_scenes(options)
         case ('cost')
             call chart_cost(options)
         case ('work-precision')
@@ -107,6 +111,7 @@ contains
         call say('usage: fpm run frb_charts --profile release -- [WHAT ...] [--quick] [--out DIR]')
         call say('WHAT: all, or any of')
         call say('  speed           table: the free flow against discrete Moser-Veselov, ratios of time')
+        call say('  scenes          table: which method for which scene')
         call say('  cost            time per step against step size, all methods')
         call say('  work-precision  error at t = 10 against time spent, three bodies')
         call say('  heavy-top       the same with torque: schemes and drifts on three tops')
