@@ -200,14 +200,14 @@ contains
         real(wp), intent(inout) :: q(4)         !! attitude, body to space
         real(wp), intent(out), optional :: a(3, 3)  !! attitude matrix as the method left it, if it has one
         type(constants), intent(in), optional :: ready  !! of the body, formed here when absent
-        type(constants) :: own
+        type(constants), allocatable :: own     ! allocatable: default values take longer than a step
         real(wp) :: matrix(3, 3)
         integer :: stat
 
         if (present(ready)) then
             call advance_ready(with, ready, moments, h, nsteps, m, q, matrix, stat)
         else
-            own = new_constants(moments)
+            allocate (own, source=new_constants(moments))
             call advance_ready(with, own, moments, h, nsteps, m, q, matrix, stat)
         end if
         if (stat /= status_ok) then
