@@ -5,6 +5,7 @@ module frb_test_splitting
     use frb_inertia, only: rigid_body
     use frb_invariants, only: invariant_monitor, kinetic_energy, norm_defect, spatial_momentum, total_energy
     use frb_kinds, only: wp
+    use frb_rotations, only: quat_conjugate, quat_product
     use frb_scenes, only: heavy_top, plain_scene
     use frb_schemes, only: splitting_scheme, scheme_names
     use frb_splitting, only: integrate
@@ -25,8 +26,9 @@ contains
     subroutine test_splitting(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('splitting', 131)
+        call t%open_suite('splitting', 135)
         call test_values(t)
+        call test_top_torque(t)
         call test_orders(t)
         call test_long_run(t)
         call test_invariants(t)
@@ -181,6 +183,26 @@ contains
                        4*sqrt(sum((gain - mean)**2)/(blocks*(blocks - 1.0_wp))))
     end subroutine test_long_run
 
+    !> The torque of a heavy top is minus the change of its potential with a turn about each body axis.
+    subroutine test_top_torque(t)
+        type(tally), intent(inout) :: t
+        real(wp), parameter :: small = 1.0e-5_wp    ! difference quotient: error small**2 and eps/small
+        type(heavy_top) :: top
+        real(wp) :: q(4), tau(3), slope(3), turn(4)
+        integer :: j
+
+        top = heavy_top(force=[0.3_wp, -0.7_wp, 1.1_wp], centre=[0.5_wp, 0.9_wp, -0.4_wp])
+        q = [0.1_wp, 0.7_wp, 0.5_wp, 0.5_wp]
+        call top%torque(q, 0.0_wp, tau)
+        do j = 1, 3
+            turn = [cos(small/2), 0.0_wp, 0.0_wp, 0.0_wp]
+            turn(1 + j) = sin(small/2)
+            slope(j) = (top%potential(quat_product(q, turn), 0.0_wp) &
+                        - top%potential(quat_product(q, quat_conjugate(turn)), 0.0_wp))/(2*small)
+        end do
+        call t%close_to('torque-of-a-heavy-top-is-minus-the-slope-of-its-potential', tau, -slope, 1.0e-9_wp)
+    end subroutine test_top_torque
+
     !> What a symmetric top keeps, reversal, and the functions that tell.
     subroutine test_invariants(t)
         type(tally), intent(inout) :: t
@@ -282,10 +304,13 @@ contains
                            distance(m, q, item%m, item%q), 32*eps)
             m_seen = item%m0
             q_seen = item%q0
+            seen%count = 0
             call integrate(item%body, scheme, item%top, item%t/2000, 2000, m_seen, q_seen, seen, every=500, &
                            drift=drift, compensated=.true.)
             call t%at_most('watching-a-compensated-run-does-not-change-it', &
                            distance(m_seen, q_seen, m, q), 0.0_wp)
+            call t%at_most('observer-sees-the-end-of-a-compensated-run-as-it-is-returned', &
+                           distance(seen%m(:, 5), seen%q(:, 5), m, q), 0.0_wp)
         end do
     end subroutine test_compensated
 

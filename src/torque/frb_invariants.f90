@@ -67,12 +67,9 @@ contains
         real(wp) :: energy
         real(wp) :: along(3)
 
-        along = m(body%order)
-        if (body%turned) then
-            along = matmul(m, body%axes)
-            along = along(body%order)
-        end if
-        energy = 0.5_wp*sum(body%a*along**2)
+        along = m
+        if (body%turned) along = matmul(m, body%axes)
+        energy = 0.5_wp*sum(body%a*along(body%order)**2)
     end function kinetic_energy_of_body
 
     !> T of n bodies that are alike.
