@@ -17,6 +17,7 @@ program check
     use frb_test_groups, only: test_groups
     use frb_test_legendre, only: test_legendre
     use frb_test_quadrature, only: test_quadrature
+    use frb_test_free_flow, only: test_free_flow
     implicit none
     type(tally) :: t
     character(16) :: argument
@@ -35,6 +36,7 @@ program check
     call test_groups(t)
     call test_legendre(t)
     call test_quadrature(t)
+    call test_free_flow(t)
 
     call get_command_argument(1, argument)
     if (argument == '--fail') then
