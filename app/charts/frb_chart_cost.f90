@@ -4,6 +4,8 @@ module frb_chart_cost
     use frb_chart_methods, only: method, catalogue, find_method, style, family_dmv, family_batch
     use frb_chart_output, only: settings, open_table, open_script, draw, say, quantile
     use frb_chart_timing, only: workload, new_workload, time_in_turn
+    use frb_chart_truth, only: new_case, errors_of
+    use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
     implicit none
     private
 
@@ -117,6 +119,7 @@ contains
         type(workload), allocatable :: works(:)
         real(wp), allocatable :: ns(:, :)
         character(200) :: line
+        real(wp) :: error_m, error_q
         integer :: i, k, unit, repetitions, every
 
         repetitions = merge(5, 9, options%quick)
@@ -130,25 +133,29 @@ contains
             'ratios of times per body and step: the median over the repetitions', &
             'h*omega, dmv2 [ns], dmv10 [ns], free flow [ns], flow/dmv10, flow/dmv2, momentum only/dmv10, '// &
             'batch of 1000/cheapest dmv, batch of 1e6/cheapest dmv, batch of 1000/dmv2 over 1000 bodies, '// &
-            'scalar flow over 1000 bodies/dmv10 over 1000 bodies, frb_step/flow, quat_step/flow', unit)
+            'scalar flow over 1000 bodies/dmv10 over 1000 bodies, frb_step/flow, quat_step/flow, '// &
+            'error of one step of dmv10 [rad] (it does not converge for long steps)', unit)
         call say('ratios; "1000" and "1e6": so many bodies; dmv: the cheapest order for one body')
         call say(' h omega   dmv2  dmv10   flow flow/dmv10 flow/dmv2  m/dmv10  1000/dmv   1e6/dmv  '// &
             '1000/1000  '// &
-                 '1000/1000  frb_step quat_step')
+                 '1000/1000  frb_step quat_step     dmv10')
         call say('             ns     ns     ns                                batch/    batch/   '// &
             'batch/dmv2 '// &
-                 'flow/dmv10    /flow     /flow')
+                 'flow/dmv10    /flow     /flow     error')
         do k = 1, size(steps), every
             works%h = steps(k)
             works%nsteps = 1
+            call errors_of(find_method('dmv10'), new_case(moments, start, steps(k)), 1, error_m, error_q)
+            if (error_q > 1.0e10_wp) error_q = ieee_value(error_q, ieee_quiet_nan)
             call time_in_turn(options, 'speed', works, 2.0e-3_wp, .false., ns)
             associate (dmv2 => ns(1, :), dmv10 => ns(5, :), flow => ns(6, :), cheapest => minval(ns(1:5, &
                 :), dim=1))
-                write (line, '(es9.1,3f7.1,9f10.3)') steps(k), middle(dmv2), middle(dmv10), middle(flow), &
+                write (line, '(es9.1,3f7.1,9f10.3,es10.1)') steps(k), middle(dmv2), middle(dmv10), &
+                    middle(flow), &
                     middle(flow/dmv10), middle(flow/dmv2), middle(ns(7, :)/dmv10), middle(ns(8, &
                     :)/cheapest), &
                     middle(ns(9, :)/cheapest), middle(ns(8, :)/ns(11, :)), middle(ns(13, :)/ns(12, :)), &
-                    middle(ns(14, :)/flow), middle(ns(15, :)/flow)
+                    middle(ns(14, :)/flow), middle(ns(15, :)/flow), error_q
             end associate
             write (unit, '(a)') trim(line)
             call say(trim(line))

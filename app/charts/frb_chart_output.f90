@@ -71,7 +71,8 @@ contains
 
         call execute_command_line('command -v gnuplot > /dev/null', exitstat=code, cmdstat=command_code)
         if (command_code /= 0 .or. code /= 0) then
-            call say('  '//options%folder//'/'//name//'.gp: not drawn, there is no gnuplot; table and script are kept')
+            call say('  '//options%folder//'/'//name// &
+                '.gp: not drawn, there is no gnuplot; table and script are kept')
             return
         end if
         call execute_command_line('cd '''//options%folder//''' && gnuplot '//name//'.gp', exitstat=code, &

@@ -36,6 +36,8 @@ contains
         do k = 1, counts
             n = 10**(k - 1)
             work = new_workload(find_method('flow'), moments, m0, h, n)
+            ! On the wall with threads: those that wait for work would count as processor time.
+            work%by_the_wall = two
             do i = 1, curves
                 if (threads(i) > 1 .and. (.not. two .or. n < 1000)) cycle
                 call set(i)
