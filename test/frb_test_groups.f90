@@ -175,8 +175,8 @@ contains
                        compensated=.true.)
         call t%close_to('watching-a-compensated-group-does-not-change-its-run', [m, q], &
                         [m_fine, q_fine], 0.0_wp)
-        call t%close_to('group-observer-sees-the-end-of-a-compensated-run-as-it-is-returned', [seen%m, seen%q], &
-                        [m, q], 0.0_wp)
+        call t%close_to('group-observer-sees-the-end-of-a-compensated-run-as-it-is-returned', &
+                        [seen%m, seen%q], [m, q], 0.0_wp)
         call integrate(body, splitting_scheme('srkn14'), scene, -0.01_wp, 300, m, q, compensated=.true.)
         call t%at_most('a-compensated-group-runs-back-to-its-start', &
                        max(maxval(abs(m - m_start)), maxval(abs(q - q_start))), 8*eps)

@@ -56,18 +56,19 @@ contains
         real(wp), intent(in) :: q(4), t
         real(wp), intent(out) :: tau(3)
 
-        real(wp) :: u1, u2, u3, w1, w2, w3
+        real(wp) :: f(3), u1, u2, u3, w1, w2, w3
 
         associate (unused_t => t)
         end associate
-        ! Written out: a call of quat_rotate would cost more than the arithmetic. w = 2 f x q, u = f + q0 w +
-        ! w x q.
-        w1 = 2*(self%force(2)*q(4) - self%force(3)*q(3))
-        w2 = 2*(self%force(3)*q(2) - self%force(1)*q(4))
-        w3 = 2*(self%force(1)*q(3) - self%force(2)*q(2))
-        u1 = self%force(1) + q(1)*w1 + (w2*q(4) - w3*q(3))
-        u2 = self%force(2) + q(1)*w2 + (w3*q(2) - w1*q(4))
-        u3 = self%force(3) + q(1)*w3 + (w1*q(3) - w2*q(2))
+        ! Written out in short chains of operations: a call of quat_rotate would cost more than the arithmetic.
+        ! w = 2 f x q, u = f + q0 w + w x q.
+        f = 2*self%force
+        w1 = f(2)*q(4) - f(3)*q(3)
+        w2 = f(3)*q(2) - f(1)*q(4)
+        w3 = f(1)*q(3) - f(2)*q(2)
+        u1 = (self%force(1) + q(1)*w1) + (w2*q(4) - w3*q(3))
+        u2 = (self%force(2) + q(1)*w2) + (w3*q(2) - w1*q(4))
+        u3 = (self%force(3) + q(1)*w3) + (w1*q(3) - w2*q(2))
         tau(1) = u2*self%centre(3) - u3*self%centre(2)
         tau(2) = u3*self%centre(1) - u1*self%centre(3)
         tau(3) = u1*self%centre(2) - u2*self%centre(1)

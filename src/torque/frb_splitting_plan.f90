@@ -2,7 +2,6 @@
 !> checks every call has in common, and compensated updates.
 module frb_splitting_plan
     use frb_kinds, only: wp
-    use frb_rotations, only: cross, quat_product
     use frb_schemes, only: splitting_scheme, most_stages
     use frb_status, only: status_ok, status_bad_count, status_bad_time
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
@@ -113,17 +112,21 @@ contains
     pure subroutine turn_increments(r, m, q, m_increment, q_increment)
         real(wp), intent(in) :: r(4), m(3), q(4)
         real(wp), intent(out) :: m_increment(3), q_increment(4)
-        real(wp) :: w(4), across(3)
+        real(wp) :: w, c1, c2, c3
 
-        w = r
-        if (r(1) > 0.0_wp) then
-            w(1) = -(r(2)*r(2) + r(3)*r(3) + r(4)*r(4))/(1 + r(1))
-        else
-            w(1) = r(1) - 1
-        end if
-        across = cross(r(2:4), m)
-        m_increment = 2*(cross(r(2:4), across) - r(1)*across)
-        q_increment = quat_product(q, w)
+        w = r(1) - 1
+        if (r(1) > 0.0_wp) w = -(r(2)*r(2) + r(3)*r(3) + r(4)*r(4))/(1 + r(1))
+        ! With c = r x m the increment of m is 2 (r x c - r1 c).
+        c1 = 2*(r(3)*m(3) - r(4)*m(2))
+        c2 = 2*(r(4)*m(1) - r(2)*m(3))
+        c3 = 2*(r(2)*m(2) - r(3)*m(1))
+        m_increment(1) = (r(3)*c3 - r(4)*c2) - r(1)*c1
+        m_increment(2) = (r(4)*c1 - r(2)*c3) - r(1)*c2
+        m_increment(3) = (r(2)*c2 - r(3)*c1) - r(1)*c3
+        q_increment(1) = q(1)*w - q(2)*r(2) - q(3)*r(3) - q(4)*r(4)
+        q_increment(2) = q(1)*r(2) + q(2)*w + q(3)*r(4) - q(4)*r(3)
+        q_increment(3) = q(1)*r(3) + q(3)*w + q(4)*r(2) - q(2)*r(4)
+        q_increment(4) = q(1)*r(4) + q(4)*w + q(2)*r(3) - q(3)*r(2)
     end subroutine turn_increments
 
 end module frb_splitting_plan
