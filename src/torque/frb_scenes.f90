@@ -60,7 +60,7 @@ contains
 
         associate (unused_t => t)
         end associate
-        ! Written out in short chains of operations: a call of quat_rotate would cost more than the arithmetic.
+        ! Written out in short chains of operations: a call of quat_rotate would cost more than that.
         ! w = 2 f x q, u = f + q0 w + w x q.
         f = 2*self%force
         w1 = f(2)*q(4) - f(3)*q(3)

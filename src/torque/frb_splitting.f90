@@ -21,9 +21,9 @@ module frb_splitting
     !> that differ (`status_bad_count`); m not finite (`status_bad_momentum`); q not finite or of norm zero
     !> (`status_bad_attitude`); a torque that is not finite, at any time of the run (`status_bad_torque`).
     !>
-    !> `compensated` carries the rounding error of every update of m and q over to the next one. It takes about
-    !> 40 % more time and pays in long runs of small steps: there energy, momentum and norm stay within a few
-    !> units of the last digit, where a plain run wanders by the square root of the number of steps.
+    !> `compensated` carries the rounding error of every update of m and q over to the next one. It takes
+    !> about 40 % more time and pays in long runs of small steps: there energy, momentum and norm stay within
+    !> a few units of the last digit, where a plain run wanders by the square root of the number of steps.
     !> Accuracy: energy of the paper's heavy top within 1e-13 over 1e5 steps of 0.5; checked by `splitting:
     !> energy-of-the-papers-top-stays-within-1e-13`; compensated, of the Hairer-Vilmart top within 32 epsilon
     !> over 20 000 steps of 0.01; checked by `splitting: compensated-energy-does-not-wander`.
