@@ -9,6 +9,7 @@ module frb
     use frb_matrix_step, only: frb_step
     use frb_quat_step, only: quat_step
     use frb_free_flow, only: free_flow
+    use frb_free_motion, only: free_motion
     use frb_carlson, only: rf, rc, rj, rd
     use frb_agm, only: ellip_k, ellip_f, jacobi_am, jacobi, landen_step
     use frb_legendre, only: ellpi, ellint_pi, ellint_pi_between
@@ -28,7 +29,7 @@ module frb
     public :: status_bad_momentum, status_bad_attitude, status_bad_time, status_bad_count, status_bad_option
     public :: status_bad_torque, status_bad_scheme, status_no_period, status_lapack_failed
     public :: quat_product, quat_conjugate, quat_rotate, quat_to_matrix, matrix_to_quat
-    public :: rigid_body, principal_axes, free_flow
+    public :: rigid_body, principal_axes, free_flow, free_motion
     public :: rf, rc, rj, rd
     public :: ellip_k, ellip_f, jacobi_am, jacobi, landen_step
     public :: ellpi, ellint_pi, ellint_pi_between

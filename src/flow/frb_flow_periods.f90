@@ -44,20 +44,27 @@ contains
 
     !> Takes whole half periods 2 T4 out of the time 1: what is left is `fraction`, |fraction| <= T4; an odd
     !> number of them turns the sign of s and of the cn-like function; the integral of the third kind over
-    !> them is `whole`. On the separatrix itself nothing is taken out.
+    !> what is taken out is `whole`. On the separatrix (delta < 1e-200 pmax) there are no periods: the motion has
+    !> settled on the middle axis to all digits after 60 units of 1/lambda, and the rest is uniform.
     pure subroutine reduce_periods(pmax, delta, nu, fraction, odd, whole)
         real(wp), intent(in) :: pmax, delta, nu
         real(wp), intent(out) :: fraction
         logical, intent(out) :: odd
         real(wp), intent(out) :: whole
         real(wp), parameter :: most_exact = 2.0_wp**26
+        real(wp), parameter :: separatrix = 1.0e-200_wp
+        real(wp), parameter :: settled = 60.0_wp
         real(wp), parameter :: round_up = 6755399441055744.0_wp    ! 3 * 2^51: adding it rounds to an integer
         real(wp) :: period, mean, half, number, high
 
         fraction = 1.0_wp
         whole = 0.0_wp
         odd = .false.
-        if (delta <= 0.0_wp) return
+        if (delta <= separatrix*pmax) then
+            fraction = min(1.0_wp, settled/sqrt(pmax))
+            whole = (1 - fraction)/(pmax + nu)
+            return
+        end if
         call quarter_period(pmax, delta, nu, period, mean)
         half = 2*period
         number = 1/half

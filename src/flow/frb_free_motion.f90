@@ -1,0 +1,220 @@
+!> One free motion at many times: `free_motion`, with its period and its precession, constants set up once.
+!>
+!> After one period T the momentum in the body is back and the attitude has turned about the momentum, fixed in
+!> space, by the angle of precession. So m and q at any time are those at a time within half a period of the
+!> start, turned n times; the error of the phase grows with the rounding of T and of the angle alone.
+module frb_free_motion
+    use frb_flow_periods, only: quarter_period
+    use frb_free_flow, only: free_flow
+    use frb_inertia, only: rigid_body
+    use frb_kinds, only: wp
+    use frb_rotations, only: norm3, quat_product, quat_rotate
+    use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_count, status_bad_momentum, &
+        status_bad_time
+    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_value, ieee_positive_inf, ieee_quiet_nan
+    implicit none
+    private
+
+    public :: free_motion
+
+    !> A free motion given by its body and its state at t = 0: `motion = free_motion(body, m, q)`.
+    !> `status` is not status_ok when the body, m or q was refused; `at` then hands it on.
+    type :: free_motion
+        integer :: status = status_bad_momentum
+        logical :: periodic = .false.       !! .false. on a separatrix, on the middle axis, for a sphere, m = 0
+        type(rigid_body), private :: body
+        real(wp), private :: m0(3) = 0.0_wp
+        real(wp), private :: q0(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+        real(wp), private :: axis(3) = 0.0_wp       !! direction of the momentum in space
+        real(wp), private :: period_of_m = 0.0_wp
+        real(wp), private :: half_angle = 0.0_wp    !! half the precession, as the quaternion turns in a period
+        real(wp), private :: turns_sign = 1.0_wp    !! -1 when q changes sign besides
+    contains
+        procedure, private :: at_time
+        procedure, private :: at_times
+        generic :: at => at_time, at_times
+        procedure :: period
+        procedure :: precession
+    end type free_motion
+
+    interface free_motion
+        module procedure motion_from_state
+    end interface free_motion
+
+contains
+
+    !> The motion of `body` that has m and q at t = 0; its `status` says whether they can be used.
+    function motion_from_state(body, m, q) result(motion)
+        type(rigid_body), intent(in) :: body
+        real(wp), intent(in) :: m(3)            !! body angular momentum at t = 0
+        real(wp), intent(in) :: q(4)            !! attitude at t = 0; not zero, its norm is kept
+        type(free_motion) :: motion
+        real(wp) :: largest
+
+        motion%body = body
+        motion%status = body%status
+        if (motion%status /= status_ok) return
+        if (.not. all(ieee_is_finite(m))) then
+            motion%status = status_bad_momentum
+        else if (.not. all(ieee_is_finite(q))) then
+            motion%status = status_bad_attitude
+        else if (maxval(abs(q)) <= 0.0_wp) then
+            motion%status = status_bad_attitude
+        end if
+        if (motion%status /= status_ok) return
+        motion%m0 = m
+        motion%q0 = q
+        largest = maxval(abs(m))
+        if (largest <= 0.0_wp) return
+        motion%axis = m/largest
+        motion%axis = motion%axis/norm3(motion%axis)
+        motion%axis = quat_rotate(scale(q, -exponent(maxval(abs(q))))/norm4(q), motion%axis)
+        call set_up_period(motion)
+    end function motion_from_state
+
+    !> Period 4 K(k)/lambda and precession, theta(T) = G T (a1 - beta nu <s^2/(1 + nu s^2)>), or its mirror form.
+    subroutine set_up_period(motion)
+        type(free_motion), intent(inout) :: motion
+        real(wp) :: n(3), a(3), alpha, beta, gamma, g, pt, rt, p, r, delta, nu, quarter, mean
+        integer :: em, ea
+        logical :: first_form
+
+        associate (body => motion%body)
+            n = motion%m0
+            if (body%turned) n = matmul(n, body%axes)
+            ! Momentum and moments scaled by powers of 2, so that no norm is too large or too small.
+            em = exponent(maxval(abs(n)))
+            ea = exponent(body%a(1))
+            n = scale(n(body%order), -em)
+            a = scale(body%a, -ea)
+            alpha = scale(body%alpha, -ea)
+            beta = scale(body%beta, -ea)
+            gamma = scale(body%gamma, -ea)
+        end associate
+        g = norm3(n)
+        pt = beta*n(1)**2 + alpha*n(2)**2
+        rt = gamma*n(2)**2 + beta*n(3)**2
+        p = gamma*pt
+        r = alpha*rt
+        delta = beta*(alpha*n(3)**2 - gamma*n(1)**2)
+        motion%periodic = abs(delta) > 0.0_wp
+        if (.not. motion%periodic) return
+        first_form = gamma*rt <= alpha*pt
+        nu = merge(gamma*rt, alpha*pt, first_form)
+        call quarter_period(max(p, r), abs(delta), nu, quarter, mean)
+        if (first_form) then
+            motion%half_angle = 2*quarter*g*(a(1) - beta*nu*mean)
+            motion%turns_sign = merge(1.0_wp, -1.0_wp, delta <= 0.0_wp)
+        else
+            motion%half_angle = 2*quarter*g*(a(3) + beta*nu*mean)
+            motion%turns_sign = merge(-1.0_wp, 1.0_wp, delta <= 0.0_wp)
+        end if
+        motion%period_of_m = scale(4*quarter, -(em + ea))
+    end subroutine set_up_period
+
+    !> m, and q when present, at the time t of either sign.
+    subroutine at_time(self, t, m, q, stat)
+        class(free_motion), intent(in) :: self
+        real(wp), intent(in) :: t                       !! time
+        real(wp), intent(out) :: m(3)                   !! body angular momentum at t
+        real(wp), intent(out), optional :: q(4)         !! attitude at t
+        integer, intent(out), optional :: stat
+        integer, parameter :: most_digits = 52
+        real(wp), parameter :: splitter = 2.0_wp**27 + 1
+        real(wp) :: number, high, rest, angle
+        integer :: code
+
+        m = self%m0
+        if (present(q)) q = self%q0
+        code = self%status
+        if (code == status_ok .and. .not. ieee_is_finite(t)) code = status_bad_time
+        if (code == status_ok) then
+            number = 0.0_wp
+            rest = t
+            if (self%periodic) then
+                if (abs(t) > 0.5_wp*self%period_of_m) then
+                    if (exponent(t) - exponent(self%period_of_m) > most_digits) then
+                        rest = mod(t, self%period_of_m)     ! no digit of the phase is left
+                    else
+                        ! Below 2^26 turns number*high is exact: nothing is lost but the rounding of the period.
+                        number = anint(t/self%period_of_m)
+                        high = self%period_of_m*splitter
+                        high = high - (high - self%period_of_m)
+                        rest = (t - number*high) - number*(self%period_of_m - high)
+                    end if
+                end if
+            end if
+            if (present(q)) then
+                call free_flow(self%body, rest, m, q, code)
+                if (abs(number) > 0.0_wp) then
+                    angle = number*self%half_angle
+                    q = quat_product([cos(angle), sin(angle)*self%axis], q)
+                    if (self%turns_sign < 0.0_wp .and. abs(mod(number, 2.0_wp)) > 0.5_wp) q = -q
+                end if
+            else
+                call free_flow(self%body, rest, m, code)
+            end if
+        end if
+        call conclude(code, 'free_motion%at', stat)
+    end subroutine at_time
+
+    !> m(3, n), and q(4, n) when present, at the n times t. status_bad_count if the sizes do not match; the
+    !> arrays then hold the state at t = 0.
+    subroutine at_times(self, t, m, q, stat)
+        class(free_motion), intent(in) :: self
+        real(wp), intent(in) :: t(:)
+        real(wp), intent(out) :: m(:, :)
+        real(wp), intent(out), optional :: q(:, :)
+        integer, intent(out), optional :: stat
+        integer :: code, one, i
+
+        code = self%status
+        if (size(m, 1) /= 3 .or. size(m, 2) /= size(t)) code = status_bad_count
+        if (present(q)) then
+            if (size(q, 1) /= 4 .or. size(q, 2) /= size(t)) code = status_bad_count
+        end if
+        if (code /= status_ok) then
+            m = 0.0_wp
+            if (present(q)) q = 0.0_wp
+        else
+            do i = 1, size(t)
+                if (present(q)) then
+                    call self%at_time(t(i), m(:, i), q(:, i), one)
+                else
+                    call self%at_time(t(i), m(:, i), stat=one)
+                end if
+                code = max(code, one)
+            end do
+        end if
+        call conclude(code, 'free_motion%at', stat)
+    end subroutine at_times
+
+    !> Period of the momentum in the body; on a stable axis that of small oscillations about it; Inf where there
+    !> is none (`periodic` is then .false.).
+    pure function period(self) result(time)
+        class(free_motion), intent(in) :: self
+        real(wp) :: time
+
+        time = ieee_value(1.0_wp, ieee_positive_inf)
+        if (self%periodic) time = self%period_of_m
+    end function period
+
+    !> Angle about the momentum, right-handed, by which the body has turned after one period [rad]; it is
+    !> defined modulo 2 pi. NaN where there is no period.
+    pure function precession(self) result(angle)
+        class(free_motion), intent(in) :: self
+        real(wp) :: angle
+
+        angle = ieee_value(1.0_wp, ieee_quiet_nan)
+        if (self%periodic) angle = 2*self%half_angle
+    end function precession
+
+    !> Norm of a quaternion scaled to the middle of the exponents.
+    pure function norm4(q) result(norm)
+        real(wp), intent(in) :: q(4)
+        real(wp) :: norm
+
+        norm = sqrt(sum(scale(q, -exponent(maxval(abs(q))))**2))
+    end function norm4
+
+end module frb_free_motion

@@ -1,0 +1,118 @@
+!> One motion at many times, its period and its precession.
+module frb_test_free_motion
+    use frb_checks, only: tally
+    use frb_free_flow, only: free_flow
+    use frb_free_motion, only: free_motion
+    use frb_inertia, only: rigid_body
+    use frb_kinds, only: wp, pi, two_pi
+    use frb_reference_cases, only: reference_case, read_cases, score_momentum, score_attitude
+    use frb_rotations, only: quat_conjugate, quat_product, quat_rotate
+    use frb_status, only: status_ok, status_bad_moments, status_bad_momentum, status_bad_attitude, &
+        status_bad_count, status_bad_time
+    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_value, ieee_quiet_nan
+    implicit none
+    private
+
+    public :: test_free_motion
+
+    real(wp), parameter :: eps = epsilon(1.0_wp)
+    real(wp), parameter :: unit(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+    real(wp), parameter :: start(4) = [0.5_wp, -0.5_wp, 0.5_wp, 0.5_wp]
+
+contains
+
+    subroutine test_free_motion(t)
+        type(tally), intent(inout) :: t
+        type(reference_case), allocatable :: cases(:)
+        type(free_motion) :: motion
+        real(wp) :: worst_m, worst_q, m(3), q(4), moved_m(3), moved_q(4), ms(3, 4), qs(4, 4), nan
+        real(wp), parameter :: times(4) = [0.0_wp, -3.5_wp, 12.0_wp, 1.0e4_wp]
+        integer :: i, stat
+        logical :: same
+
+        call t%open_suite('free-motion', 20)
+        nan = ieee_value(1.0_wp, ieee_quiet_nan)
+        call read_cases('data/reference/cases.txt', cases)
+        worst_m = 0.0_wp
+        worst_q = 0.0_wp
+        do i = 1, size(cases)
+            motion = free_motion(rigid_body(cases(i)%moments), cases(i)%m0, unit)
+            call motion%at(cases(i)%h, m, q)
+            worst_m = max(worst_m, score_momentum(cases(i), m))
+            worst_q = max(worst_q, score_attitude(cases(i), q))
+        end do
+        call t%at_most('momentum-at-any-time-is-within-4-units', worst_m, 4.0_wp)
+        call t%at_most('attitude-at-any-time-is-within-4-units', worst_q, 4.0_wp)
+
+        call check_period(t, [1.0_wp, 2.0_wp, 3.0_wp], [0.3_wp, 0.5_wp, 0.8_wp], 'about-the-third-axis')
+        call check_period(t, [3.0_wp, 1.0_wp, 2.0_wp], [0.1_wp, -0.9_wp, 0.3_wp], 'about-the-first-axis')
+        call check_period(t, [2.0_wp, 2.0_wp, 3.0_wp], [0.4_wp, 0.1_wp, -0.7_wp], 'of-a-symmetric-body')
+        call check_period(t, [1.0e-100_wp, 2.0e-100_wp, 3.0e-100_wp], [4.0e150_wp, 1.0e150_wp, -7.0e150_wp], &
+                          'of-huge-momentum')
+
+        motion = free_motion(rigid_body([2.0_wp, 2.0_wp, 3.0_wp]), [0.3_wp, 0.4_wp, 1.2_wp], unit)
+        call t%close_to('period-of-a-symmetric-body', motion%period(), two_pi/(1.2_wp/6), 8*eps*motion%period())
+        call t%close_to('symmetric-body-precesses-at-the-rate-of-its-transverse-moment', motion%precession(), &
+                        1.3_wp/2*motion%period(), 8*eps*motion%precession())
+        motion = free_motion(rigid_body([2.0_wp, 3.0_wp, 6.0_wp]), [0.4_wp, 0.8_wp, 0.4_wp], unit)
+        call t%ok('no-period-on-the-separatrix', .not. motion%periodic .and. .not. ieee_is_finite(motion%period()))
+        motion = free_motion(rigid_body([2.0_wp, 3.0_wp, 6.0_wp]), [0.0_wp, 0.8_wp, 0.0_wp], unit)
+        call t%ok('no-period-on-the-middle-axis', .not. motion%periodic)
+        motion = free_motion(rigid_body([2.0_wp, 2.0_wp, 2.0_wp]), [0.1_wp, 0.8_wp, 0.0_wp], unit)
+        call t%ok('no-period-of-a-sphere', .not. motion%periodic)
+        call motion%at(2.0_wp, m, q)
+        call t%close_to('sphere-turns-uniformly', q(1), cos(sqrt(0.65_wp)/2), 2*eps)
+
+        motion = free_motion(rigid_body([2.0_wp, 3.0_wp, 6.0_wp]), [0.4_wp, 0.7_wp, 0.4_wp], start)
+        call motion%at(times, ms, qs)
+        same = .true.
+        do i = 1, size(times)
+            call motion%at(times(i), m, q)
+            same = same .and. all(abs(m - ms(:, i)) <= 0.0_wp) .and. all(abs(q - qs(:, i)) <= 0.0_wp)
+        end do
+        call t%ok('array-of-times-equals-each-time', same)
+        moved_m = [0.4_wp, 0.7_wp, 0.4_wp]
+        moved_q = start
+        call free_flow(rigid_body([2.0_wp, 3.0_wp, 6.0_wp]), 12.0_wp, moved_m, moved_q)
+        call t%close_to('sign-of-the-quaternion-is-that-of-the-flow', qs(:, 3), moved_q, 64*eps)
+
+        motion = free_motion(rigid_body([-1.0_wp, 2.0_wp, 3.0_wp]), m, q)
+        call motion%at(1.0_wp, m, q, stat)
+        call t%equal('bad-body-is-refused', stat, status_bad_moments)
+        motion = free_motion(rigid_body([1.0_wp, 2.0_wp, 3.0_wp]), [1.0_wp, nan, 0.0_wp], unit)
+        call t%equal('nan-momentum-is-refused', motion%status, status_bad_momentum)
+        motion = free_motion(rigid_body([1.0_wp, 2.0_wp, 3.0_wp]), [1.0_wp, 0.0_wp, 0.0_wp], 0*unit)
+        call t%equal('zero-quaternion-is-refused', motion%status, status_bad_attitude)
+        motion = free_motion(rigid_body([1.0_wp, 2.0_wp, 3.0_wp]), [0.0_wp, 0.0_wp, 0.0_wp], start)
+        call motion%at(5.0_wp, m, q, stat)
+        call t%ok('body-at-rest-stays-at-rest', stat == status_ok .and. all(abs(m) <= 0.0_wp) &
+                  .and. all(abs(q - start) <= 0.0_wp))
+        call motion%at(nan, m, q, stat)
+        call t%equal('nan-time-is-refused', stat, status_bad_time)
+        call motion%at(times, ms, qs(:, 1:2), stat)
+        call t%equal('sizes-that-differ-are-refused', stat, status_bad_count)
+        call t%close_suite()
+    end subroutine test_free_motion
+
+    !> After the period m is back, and the attitude is turned about the momentum in space by the precession.
+    subroutine check_period(t, moments, m0, name)
+        type(tally), intent(inout) :: t
+        real(wp), intent(in) :: moments(3), m0(3)
+        character(*), intent(in) :: name
+        type(free_motion) :: motion
+        real(wp) :: m(3), q(4), change(4), axis(3), tolerance
+
+        motion = free_motion(rigid_body(moments), m0, start)
+        m = m0
+        q = start
+        tolerance = 16*eps*max(1.0_wp, motion%precession())
+        call free_flow(rigid_body(moments), motion%period(), m, q)
+        axis = m0/maxval(abs(m0))
+        axis = quat_rotate(start, axis/sqrt(sum(axis**2)))
+        change = quat_product([cos(0.5_wp*motion%precession()), sin(0.5_wp*motion%precession())*axis], start)
+        change = quat_product(q, quat_conjugate(change))
+        call t%ok('momentum-is-back-and-attitude-turned-after-the-period-'//name, &
+                  all(abs(m - m0) <= tolerance*maxval(abs(m0))) .and. all(abs(change(2:4)) <= tolerance))
+    end subroutine check_period
+
+end module frb_test_free_motion
