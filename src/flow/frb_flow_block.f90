@@ -32,7 +32,7 @@ contains
         real(wp) :: nu(lanes), gg(lanes), angle(lanes), cosm1(lanes), form(lanes)
         real(wp) :: d1(lanes), d2(lanes), d3(lanes), v0(lanes), v2(lanes), v3(lanes)
         real(wp) :: long(lanes)
-        real(wp) :: square, z0, z1, z2, z3, y2, y3
+        real(wp) :: square, z0, z1, z2, z3, y2, y3, e1, e2, e3, w0, w1, w2, w3
         integer :: l, reached, many_long
 
         many_long = 0
@@ -76,8 +76,12 @@ contains
                 call unit_increment(v0(l), v2(l), v3(l), z0, z2, z3)
                 z1 = merge(0.0_wp, z3, form(l) > 0.0_wp)
                 z3 = merge(z3, 0.0_wp, form(l) > 0.0_wp)
-                call turn(cosm1(l), angle(l)*m1(l), angle(l)*m2(l), angle(l)*m3(l), z0, z1, z2, z3, &
-                          bodies%q(l, 0), bodies%q(l, 1), bodies%q(l, 2), bodies%q(l, 3))
+                e1 = angle(l)*m1(l)
+                e2 = angle(l)*m2(l)
+                e3 = angle(l)*m3(l)
+                call join_turns(cosm1(l), e1, e2, e3, z0, z1, z2, z3, w1, w2, w3)
+                call close_turn(cosm1(l), e1, e2, e3, z0, z1, z2, z3, w0, w1, w2, w3)
+                call turn(w0, w1, w2, w3, bodies%q(l, 0), bodies%q(l, 1), bodies%q(l, 2), bodies%q(l, 3))
             end do
         end if
         do l = 1, lanes
@@ -122,7 +126,6 @@ contains
             real(wp) :: s(lanes), y(lanes), c(lanes), d(lanes), cd(lanes), ec(lanes), es(lanes)
             real(wp) :: delta(lanes), bg(lanes), f(lanes), triples(lanes), squares(lanes)
             real(wp) :: norm, n1, n2, n3, cp, dr, sine, cosine, new_y, new_s, new_c, new_d, new_ec, new_es, n
-            real(wp) :: e1, e2, e3
             integer :: most_triples, most_squares, over, i
 
             do l = 1, lanes
@@ -158,7 +161,8 @@ contains
                 most_squares = most_squares + 1
             end do
             do l = 1, lanes
-                call base_triple(p(l), r(l), nu(l), bg(l), f(l), s(l), y(l), ec(l), es(l))
+                call base_series(p(l), r(l), f(l), s(l), y(l))
+                call base_angle(p(l), r(l), nu(l), bg(l), s(l), y(l), ec(l), es(l))
             end do
             do i = 1, most_squares
                 n = real(i, wp)

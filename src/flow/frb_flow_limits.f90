@@ -5,13 +5,14 @@ module frb_flow_limits
     implicit none
     private
 
-    public :: short_limit, tiny_limit, tiny_turn_limit, small_turn_limit, base_limit, square_limit
-    public :: period_limit, sin_cos_limit, plain_largest, plain_smallest
+    public :: short_limit, tiny_limit, tiny_turn_limit, small_turn_limit, middle_turn_limit, base_limit
+    public :: square_limit, period_limit, sin_cos_limit, plain_largest, plain_smallest
 
     real(wp), parameter :: short_limit = 0.002_wp       !! largest max(P, R) (h/2)^2 of the short series
-    real(wp), parameter :: tiny_limit = 4.0e-6_wp       !! the same of the first terms alone
-    real(wp), parameter :: tiny_turn_limit = 2.0e-5_wp  !! largest square of a half angle of the first terms
+    real(wp), parameter :: tiny_limit = 1.0e-4_wp       !! the same of the first terms alone
+    real(wp), parameter :: tiny_turn_limit = 1.0e-3_wp  !! largest square of a half angle of the first terms
     real(wp), parameter :: small_turn_limit = 0.04_wp   !! largest square of a half angle of the short series
+    real(wp), parameter :: middle_turn_limit = 0.6_wp   !! largest square of a half angle of the long series
     real(wp), parameter :: base_limit = 0.03_wp         !! largest max(P, R, nu) t^2 where doubling starts
     real(wp), parameter :: square_limit = 0.6_wp        !! largest max(P, R) t^2 to which s^2 alone is doubled
     real(wp), parameter :: period_limit = 4.0_wp        !! max(P, R) (h/2)^2 from which periods are taken out

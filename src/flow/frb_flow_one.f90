@@ -4,7 +4,7 @@
 !> Closed form: m by the addition theorem of the elliptic functions written in m itself; attitude q e z with e a
 !> rotation about m by an angle with one integral of the third kind, z algebraic. Every update is an increment.
 module frb_flow_one
-    use frb_flow_limits, only: short_limit, tiny_limit, tiny_turn_limit, small_turn_limit, base_limit, &
+    use frb_flow_limits, only: short_limit, tiny_limit, tiny_turn_limit, small_turn_limit, middle_turn_limit, base_limit, &
         square_limit, period_limit, sin_cos_limit, plain_largest, plain_smallest
     use frb_flow_periods, only: reduce_periods
     use frb_inertia, only: rigid_body
@@ -16,6 +16,8 @@ module frb_flow_one
 
     public :: flow_one, flow_turned
 
+    !> How far a step reaches: which series it takes.
+    integer, parameter :: tiny_step = 1, short_step = 2, middle_step = 3, long_reach = 4
     real(wp), parameter :: largest_square_angle = 1.0e40_wp
 
 contains
@@ -29,10 +31,11 @@ contains
         integer, intent(out) :: code
         real(wp), intent(inout), optional :: q(4)
         real(wp) :: t, a, b, g, m1, m2, m3, x1, x2, x3, pt, rt, p, r, rate, gg, largest
-        real(wp) :: y, scd, u, w, k, a23, b31, g12, d1, d2, d3
+        real(wp) :: s, y, scd, u, w, k, a23, b31, g12, d1, d2, d3
         real(wp) :: nu, v0, v2, v3, angle, twist, z0, z2, z3, cosm1, sinc, z(3)
-        integer :: i1, i2, i3, i
-        logical :: plain, tiny_step
+        real(wp) :: e1, e2, e3, w0, w1, w2, w3
+        integer :: i1, i2, i3, i, reach
+        logical :: plain
 
         i1 = body%order(1)
         i2 = body%order(2)
@@ -67,22 +70,28 @@ contains
         p = g*pt
         r = a*rt
         gg = x1 + x2 + x3
-        if (max(p, r) > short_limit .or. rate*rate*gg > small_turn_limit) then
+        if (max(p, r, min(g*rt, a*pt)) > base_limit .or. rate*rate*gg > middle_turn_limit) then
             if (rate*rate*gg > largest_square_angle) then
                 call flow_rescaled(body, h, m, code, q)
                 return
             end if
+            reach = long_reach
             call long_step(body, t, m1, m2, m3, present(q), d1, d2, d3, v0, v2, v3, cosm1, angle)
             if (present(q)) i = merge(i3, i1, g*rt <= a*pt)
         else
             a23 = (body%parity*a)*(m2*m3)
             b31 = (body%parity*b)*(m3*m1)
             g12 = (body%parity*g)*(m1*m2)
-            tiny_step = max(p, r) <= tiny_limit .and. rate*rate*gg <= tiny_turn_limit
-            if (tiny_step) then
+            if (max(p, r) <= tiny_limit .and. rate*rate*gg <= tiny_turn_limit) then
+                reach = tiny_step
                 call tiny_series(p + r, p*r, y, scd)
-            else
+            else if (max(p, r) <= short_limit .and. rate*rate*gg <= small_turn_limit) then
+                reach = short_step
                 call short_series(p + r, p*r, y, scd)
+            else
+                reach = middle_step
+                call base_series(p, r, 1.0_wp, s, y)
+                scd = s*sqrt((1 - p*y)*(1 - r*y))
             end if
             u = p*y
             w = r*y
@@ -92,7 +101,7 @@ contains
                 ! Of the two mirror forms the one with the smaller parameter nu of the third kind.
                 if (g*rt <= a*pt) then
                     i = i3
-                    nu = (g*rt)*y
+                    nu = g*rt
                     v0 = (1 - w)*(1 - k)
                     v2 = -g*(1 - w)*(m2*scd + b31*y)
                     v3 = -b*(m3*scd - g12*y*(1 - w))
@@ -100,20 +109,24 @@ contains
                     twist = -b*nu
                 else
                     i = i1
-                    nu = (a*pt)*y
+                    nu = a*pt
                     v0 = (1 - u)*(1 - k)
                     v2 = a*(1 - u)*(m2*scd + b31*y)
                     v3 = b*(m1*scd - a23*y*(1 - u))
                     angle = body%a(3)*t
                     twist = b*nu
                 end if
-                if (tiny_step) then
-                    angle = angle + twist*(1/3.0_wp + (u + w)*(2/45.0_wp) - nu*(1/5.0_wp))
+                select case (reach)
+                case (tiny_step)
+                    angle = angle + twist*tiny_third_kind(p + r, p*r, nu)
                     call tiny_turn(angle*angle*gg, sinc, cosm1)
-                else
-                    angle = angle + twist*sqrt(y)*short_third_kind(u, w, nu)
+                case (short_step)
+                    angle = angle + twist*y*sqrt(y)*short_third_kind(u, w, nu*y)
                     call small_turn(angle*angle*gg, sinc, cosm1)
-                end if
+                case default
+                    angle = angle + twist*y*s*base_third_kind(u, w, nu*y)
+                    call middle_turn(angle*angle*gg, sinc, cosm1)
+                end select
                 angle = angle*sinc
             end if
         end if
@@ -122,30 +135,61 @@ contains
             z = 0.0_wp
             z(i2) = z2
             z(i) = z3
-            call turn(cosm1, angle*m(1), angle*m(2), angle*m(3), z0, z(1), z(2), z(3), q(1), q(2), q(3), q(4))
+            e1 = angle*m(1)
+            e2 = angle*m(2)
+            e3 = angle*m(3)
+            call join_turns(cosm1, e1, e2, e3, z0, z(1), z(2), z(3), w1, w2, w3)
+            if (reach <= short_step) then
+                ! The scalar part of a small turn follows from the norm.
+                w0 = w1*w1 + w2*w2 + w3*w3
+                w0 = -w0/(1 + sqrt(1 - w0))
+            else
+                call close_turn(cosm1, e1, e2, e3, z0, z(1), z(2), z(3), w0, w1, w2, w3)
+            end if
+            call turn(w0, w1, w2, w3, q(1), q(2), q(3), q(4))
         end if
         m(i1) = m1 + d1
         m(i2) = m2 + d2
         m(i3) = m3 + d3
     end subroutine flow_one
 
-    !> First terms of short_series: for max(p, r) <= tiny_limit the next are below 2e-17.
+    !> First terms of short_series: for max(p, r) <= tiny_limit the next are below 1e-17.
     pure subroutine tiny_series(e1, e2, y, scd)
         real(wp), intent(in) :: e1, e2
         real(wp), intent(out) :: y, scd
 
-        y = 1 - e1*(1/3.0_wp - e1*(2/45.0_wp)) + e2*(1/5.0_wp)
-        scd = 1 - e1*(2/3.0_wp - e1*(2/15.0_wp)) + e2*(3/5.0_wp)
+        y = 1 - e1*(1/3.0_wp - e1*(2/45.0_wp - e1*(1/315.0_wp))) + e2*(1/5.0_wp - e1*(3/35.0_wp))
+        scd = 1 - e1*(2/3.0_wp - e1*(2/15.0_wp - e1*(4/315.0_wp))) + e2*(3/5.0_wp - e1*(12/35.0_wp))
     end subroutine tiny_series
 
-    !> First terms of small_turn.
+    !> H in units of t^3 from the first terms of y in t: the integral of y/(1 + nu y).
+    pure function tiny_third_kind(e1, e2, nu) result(series)
+        real(wp), intent(in) :: e1, e2, nu
+        real(wp) :: series
+
+        series = 1/3.0_wp - (e1*(1/15.0_wp - e1*(2/315.0_wp)) - e2*(1/35.0_wp) &
+                             + nu*(1/5.0_wp - e1*(2/21.0_wp) - nu*(1/7.0_wp)))
+    end function tiny_third_kind
+
+    !> sin(x)/x and cos(x) - 1 from xx = x^2 <= tiny_turn_limit, to rounding.
     pure subroutine tiny_turn(xx, sinc, cosm1)
         real(wp), intent(in) :: xx
         real(wp), intent(out) :: sinc, cosm1
 
-        sinc = 1 - xx*(1/6.0_wp - xx*(1/120.0_wp))
-        cosm1 = -xx*(0.5_wp - xx*(1/24.0_wp - xx*(1/720.0_wp)))
+        sinc = 1 - xx*(1/6.0_wp - xx*(1/120.0_wp - xx*(1/5040.0_wp)))
+        cosm1 = -xx*(0.5_wp - xx*(1/24.0_wp - xx*(1/720.0_wp - xx*(1/40320.0_wp))))
     end subroutine tiny_turn
+
+    !> sin(x)/x and cos(x) - 1 from xx = x^2 <= middle_turn_limit, to rounding.
+    pure subroutine middle_turn(xx, sinc, cosm1)
+        real(wp), intent(in) :: xx
+        real(wp), intent(out) :: sinc, cosm1
+
+        sinc = 1 - xx*(1/6.0_wp - xx*(1/120.0_wp - xx*(1/5040.0_wp - xx*(1/362880.0_wp - xx*(1/39916800.0_wp &
+               - xx*(1/6227020800.0_wp - xx*(1/1307674368000.0_wp - xx*(1/355687428096000.0_wp))))))))
+        cosm1 = -xx*(0.5_wp - xx*(1/24.0_wp - xx*(1/720.0_wp - xx*(1/40320.0_wp - xx*(1/3628800.0_wp &
+                - xx*(1/479001600.0_wp - xx*(1/87178291200.0_wp - xx*(1/20922789888000.0_wp))))))))
+    end subroutine middle_turn
 
     !> flow_one for a body whose own axes are not principal: the momentum is taken to principal axes, and only
     !> the increments are taken back, so that no rounding of the rotation gathers over many steps.
@@ -236,7 +280,10 @@ contains
             f = 0.5_wp*f
             squares = squares + 1
         end do
-        call base_triple(p, r, nu, bg, f, s, y, ec, es)
+        call base_series(p, r, f, s, y)
+        ec = 1.0_wp
+        es = 0.0_wp
+        if (with_attitude) call base_angle(p, r, nu, bg, s, y, ec, es)
         do squares = squares, 1, -1
             y1 = y
             call double_square(p, r, y, s, cd)
