@@ -45,8 +45,7 @@ contains
             [-0.7360613641607939361612411474_rk, -0.5707869512403507332546212462_rk, &
              -0.2993885718307900937437669433_rk, -0.2068390861046731924831171081_rk])
         call end_values(t, 'truth-has-28-digits-on-the-flat-body', [0.345_rk, 0.653_rk, 1.0_rk], m0, &
-            10.0_rk, &
-            [1.805748694153316944124664435_rk, -0.2931590700520223516263628767_rk, &
+            10.0_rk, [1.805748694153316944124664435_rk, -0.2931590700520223516263628767_rk, &
              0.9291552148106494226863761060_rk], &
             [-0.5909531300598776824030520653_rk, 0.7497771466036242986823664977_rk, &
              -0.2775673505986917899234931261_rk, -0.1075406638671320485487867749_rk])
@@ -102,8 +101,7 @@ contains
                        real(abs(dot_product(u, m) - dot_product(u0, m0)), wp), tolerance_truth)
         call taylor_top(moments, u0, -10.0_rk, m, q)
         call t%at_most('top-run-back-returns-to-its-start', real(max(norm2(m - m0), apart(q, identity)), &
-            wp), &
-                       10*tolerance_truth)
+            wp), 10*tolerance_truth)
         m = m0
         q = identity
         m_free = m0

@@ -88,10 +88,11 @@ contains
             'set ylabel "time per step / cheapest discrete Moser-Veselov"', &
             'set key outside right center vertical spacing 1.15 samplen 2.2 Left reverse', &
             'set title "Cost of one step, its accuracy aside"', &
-            'set label "Moser-Veselov does\nnot converge here" at 3,60 center textcolor rgb '// &
+            'set label "Moser-Veselov does\nnot converge here" at 3,0.045 center textcolor rgb '// &
             '"#0072B2"', &
-            'set arrow 1 from graph 0, first 1 to graph 1, first 1 nohead lc rgb "#666666" dt 3', &
-            'plot \'
+            'set object 1 rectangle from 1.3,0.03 to 10,100 behind fillstyle solid noborder '// &
+            'fillcolor rgb "#eef3f8"', 'set yrange [0.03:100]', 'set xrange [0.001:10]', &
+            'set arrow 1 from graph 0, first 1 to graph 1, first 1 nohead lc rgb "#666666" dt 3', 'plot \'
         first = .true.
         do j = 1, size(shown)
             do i = 1, size(methods)
@@ -137,25 +138,21 @@ contains
             'error of one step of dmv10 [rad] (it does not converge for long steps)', unit)
         call say('ratios; "1000" and "1e6": so many bodies; dmv: the cheapest order for one body')
         call say(' h omega   dmv2  dmv10   flow flow/dmv10 flow/dmv2  m/dmv10  1000/dmv   1e6/dmv  '// &
-            '1000/1000  '// &
-                 '1000/1000  frb_step quat_step     dmv10')
+            '1000/1000  1000/1000  frb_step quat_step     dmv10')
         call say('             ns     ns     ns                                batch/    batch/   '// &
-            'batch/dmv2 '// &
-                 'flow/dmv10    /flow     /flow     error')
+            'batch/dmv2 flow/dmv10    /flow     /flow     error')
         do k = 1, size(steps), every
             works%h = steps(k)
             works%nsteps = 1
             call errors_of(find_method('dmv10'), new_case(moments, start, steps(k)), 1, error_m, error_q)
             if (error_q > 1.0e10_wp) error_q = ieee_value(error_q, ieee_quiet_nan)
             call time_in_turn(options, 'speed', works, 2.0e-3_wp, .false., ns)
-            associate (dmv2 => ns(1, :), dmv10 => ns(5, :), flow => ns(6, :), cheapest => minval(ns(1:5, &
-                :), dim=1))
+            associate (dmv2 => ns(1, :), dmv10 => ns(5, :), flow => ns(6, :), &
+                       cheapest => minval(ns(1:5, :), dim=1))
                 write (line, '(es9.1,3f7.1,9f10.3,es10.1)') steps(k), middle(dmv2), middle(dmv10), &
-                    middle(flow), &
-                    middle(flow/dmv10), middle(flow/dmv2), middle(ns(7, :)/dmv10), middle(ns(8, &
-                    :)/cheapest), &
-                    middle(ns(9, :)/cheapest), middle(ns(8, :)/ns(11, :)), middle(ns(13, :)/ns(12, :)), &
-                    middle(ns(14, :)/flow), middle(ns(15, :)/flow), error_q
+                    middle(flow), middle(flow/dmv10), middle(flow/dmv2), middle(ns(7, :)/dmv10), &
+                    middle(ns(8, :)/cheapest), middle(ns(9, :)/cheapest), middle(ns(8, :)/ns(11, :)), &
+                    middle(ns(13, :)/ns(12, :)), middle(ns(14, :)/flow), middle(ns(15, :)/flow), error_q
             end associate
             write (unit, '(a)') trim(line)
             call say(trim(line))

@@ -175,8 +175,9 @@ contains
         do c = 1, size(cases)
             angle = abs(cases(c)%t)*norm2(cases(c)%m0/cases(c)%moments)
             nsteps = 1
-            if (.not. with%exact .and. with%family /= family_dp) nsteps = max(1, &
-                ceiling(min(angle/small_step, 1.0e9_wp)))
+            if (.not. with%exact .and. with%family /= family_dp) then
+                nsteps = max(1, ceiling(min(angle/small_step, 1.0e9_wp)))
+            end if
             if (nsteps > most_steps .or. (with%family == family_dp .and. angle > most_steps*small_step)) then
                 scores = -1.0_wp
                 return
@@ -202,15 +203,13 @@ contains
         call open_script(options, 'failure', 1000, 1080, unit)
         write (unit, '(a)') 'set multiplot title "Largest error of '//either(options%quick, '2', '7')// &
             ' random cases; 1 unit: what rounding the inputs costs anyone"', 'set logscale xy', &
-            'set format y "10^{%T}"', &
-            'set yrange [5e-3:1e19]', 'set ytics 1,1e4', &
+            'set format y "10^{%T}"', 'set yrange [5e-3:1e19]', 'set ytics 1,1e4', &
             'set ytics add ("NaN" 1e18)', 'unset key', &
             'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0', 'set size 0.25,0.195'
         do p = 1, panels
             if (p == 9) then
                 write (unit, '(a)') 'set xrange [3e-9:3e8]', &
-                    'set xtics ("10^{-8}" 1e-8, "10^{-4}" 1e-4, "1" 1, '// &
-                    '"10^4" 1e4, "10^8" 1e8)'
+                    'set xtics ("10^{-8}" 1e-8, "10^{-4}" 1e-4, "1" 1, '//'"10^4" 1e4, "10^8" 1e8)'
             else
                 write (unit, '(a)') 'set xrange [0.3:3e-18]', &
                     'set xtics ("0" 1e-17, "10^{-15}" 1e-15, "10^{-10}" 1e-10, "10^{-5}" 1e-5, '// &
@@ -232,8 +231,7 @@ contains
         end do
         write (unit, '(a)') 'set origin 0.03,0.005', 'set size 0.94,0.16', 'unset border', 'unset tics', &
             'unset ylabel', 'unset title', 'unset grid', 'unset logscale', 'set xrange [0:1]', &
-            'set yrange [0:1]', &
-            'set key center center maxrows 4 samplen 2.2 spacing 1.2 Left reverse', &
+            'set yrange [0:1]', 'set key center center maxrows 4 samplen 2.2 spacing 1.2 Left reverse', &
             'plot NaN with boxes fs solid noborder lc rgb "#eeeeee" title "up to 4 units", \'
         entries = 0
         do j = size(shown), 1, -1

@@ -64,8 +64,8 @@ contains
         integer :: i
 
         ! Colours: the free flow vermilion, the paper's exact steps green, its semi-exact ones purple,
-        ! discrete
-        ! Moser-Veselov blue, rotations orange, Runge-Kutta black and grey; dash and symbol tell the rest.
+        ! discrete Moser-Veselov blue, rotations orange, Runge-Kutta black and grey; dash and symbol tell
+        ! the rest.
         allocate (methods(0))
         call add('flow', 'free flow', family_flow, 0, 0, 2, 1, 7, 4)
         call add('flow-batch', 'free flow, batch', family_batch, 0, 0, 2, 2, 5, 3)
@@ -87,9 +87,8 @@ contains
         end do
         do i = 2, 10, 2
             write (digits, '(i0)') i
-            call add('dmv'//digits, 'Moser-Veselov '//digits, family_dmv, i, 0, merge(3, 7, i == 2 &
-                .or. i == 10), &
-                     merge(1, 2, i > 4), i/2 + 7, 2)
+            call add('dmv'//digits, 'Moser-Veselov '//digits, family_dmv, i, 0, &
+                     merge(3, 7, i == 2 .or. i == 10), merge(1, 2, i > 4), i/2 + 7, 2)
         end do
         call add('rotations2', '3 rotations, order 2', family_rotations, 2, 0, 6, 1, 4, 2)
         call add('rotations4', '3 rotations, order 4', family_rotations, 4, 0, 6, 2, 5, 2)
@@ -165,8 +164,7 @@ contains
         character(80) :: text
 
         write (text, '(4(a,i0),a)') ' with linespoints lt ', with%colour, ' dt ', with%dash, ' pt ', &
-            with%symbol, &
-            ' lw ', with%width, ' ps 0.7'
+            with%symbol, ' lw ', with%width, ' ps 0.7'
         if (present(label)) then
             clause = trim(text)//' title "'//label//'"'
         else

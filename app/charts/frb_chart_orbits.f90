@@ -1,6 +1,5 @@
 !> Pictures of the motion itself: `orbits` (the polhodes on the sphere of the momentum) and `racket` (the
-!> flips of a
-!> tennis racket, with the errors of energy and momentum below).
+!> flips of a tennis racket, with the errors of energy and momentum below).
 module frb_chart_orbits
     use frb, only: wp, rigid_body, free_flow, quat_rotate
     use frb_chart_methods, only: method, advance, find_method
@@ -18,8 +17,7 @@ contains
         type(settings), intent(in) :: options
         real(wp), parameter :: moments(3) = [1.0_wp, 2.0_wp, 3.0_wp]
         real(wp), parameter :: angles(*) = [6.0_wp, 14.0_wp, 22.0_wp, 27.0_wp, 33.0_wp, 40.0_wp, 50.0_wp, &
-            63.0_wp, &
-            67.0_wp, 72.0_wp, 77.0_wp, 83.0_wp]
+            63.0_wp, 67.0_wp, 72.0_wp, 77.0_wp, 83.0_wp]
         integer, parameter :: points = 120
         type(rigid_body) :: body
         real(qp) :: period, turn(4)
@@ -94,8 +92,7 @@ contains
         real(wp), parameter :: eye(3) = [3.0_wp, 2.0_wp, 2.0_wp]/sqrt(17.0_wp)
         real(wp), parameter :: right(3) = [-2.0_wp, 3.0_wp, 0.0_wp]/sqrt(13.0_wp)
         real(wp), parameter :: up(3) = [eye(2)*right(3) - eye(3)*right(2), &
-            eye(3)*right(1) - eye(1)*right(3), &
-                                        eye(1)*right(2) - eye(2)*right(1)]
+            eye(3)*right(1) - eye(1)*right(3), eye(1)*right(2) - eye(2)*right(1)]
 
         seen = [dot_product(right, m), dot_product(up, m), dot_product(eye, m)]
     end function view
@@ -149,12 +146,10 @@ contains
         close (unit)
         call open_script(options, 'racket', 900, 640, unit)
         write (unit, '(a)') 'set multiplot', 'set xrange [0:100]', 'set lmargin at screen 0.1', &
-            'set rmargin at screen 0.97', &
-            'set bmargin at screen 0.56', 'set tmargin at screen 0.92', &
+            'set rmargin at screen 0.97', 'set bmargin at screen 0.56', 'set tmargin at screen 0.92', &
             'set title "Tennis racket spun about its middle axis: a flip every half period" offset 0,-0.5', &
             'set ylabel "{/Symbol w}  [rad per unit of time]"', 'set yrange [-0.52:0.62]', &
-            'set format x ""', &
-            'set key top center horizontal samplen 2.2', 'plot \', &
+            'set format x ""', 'set key top center horizontal samplen 2.2', 'plot \', &
             '  "racket.dat" index 0 using 1:2 with lines lt 3 lw 2 title "{/Symbol w}_1", \', &
             '  "" index 0 using 1:3 with lines lt 2 lw 3 title "{/Symbol w}_2", \', &
             '  "" index 0 using 1:4 with lines lt 4 lw 2 title "{/Symbol w}_3"', &

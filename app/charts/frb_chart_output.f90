@@ -53,8 +53,7 @@ contains
         write (unit, '(a,i0,a,i0,a)') 'if (!exists("format")) set terminal svg size ', width, ',', height, &
             ' font "Helvetica,15" background "#ffffff"; set output "'//name//'.svg"'
         write (unit, '(a,i0,a,i0,a)') 'if (exists("format")) set terminal pngcairo size ', width, ',', &
-            height, &
-            ' font "Helvetica,12"; set output "'//name//'.png"'
+            height, ' font "Helvetica,12"; set output "'//name//'.png"'
         do i = 1, size(palette)
             write (unit, '(a,i0,a)') 'set linetype ', i, ' lc rgb '//trim(palette(i))//' lw 2 pt 7 ps 0.5'
         end do

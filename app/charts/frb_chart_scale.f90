@@ -69,8 +69,7 @@ contains
                     cycle
                 end if
                 write (unit, '(i9,3f10.2)') 10**(k - 1), quantile(ns(:, i, k), 0.5_wp), quantile(ns(:, i, &
-                    k), 0.25_wp), &
-                    quantile(ns(:, i, k), 0.75_wp)
+                    k), 0.25_wp), quantile(ns(:, i, k), 0.75_wp)
             end do
             write (unit, '(/)')
         end do

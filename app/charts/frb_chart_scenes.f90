@@ -1,6 +1,5 @@
 !> The table `scenes`: which method for which scene. Every method does the same work to the same accuracy,
-!> with
-!> as few steps as it can; the fastest wins.
+!> with as few steps as it can; the fastest wins.
 module frb_chart_scenes
     use frb, only: wp
     use frb_chart_methods, only: method, catalogue, family_batch, family_momentum, family_dp, &
@@ -115,8 +114,7 @@ contains
     end subroutine play
 
     !> The fewest steps, of 1, 2, 4, ..., with which the method stays within the bound, or the steps of the
-    !> scene
-    !> when they do; 0 if none.
+    !> scene when they do; 0 if none.
     subroutine fewest_steps(with, what, item, steps, error)
         type(method), intent(in) :: with
         type(scene), intent(in) :: what

@@ -1,6 +1,5 @@
 !> The charts with torque: `heavy-top` (schemes and drifts, error against time) and `torus` (the paper's
-!> figure 7
-!> made again).
+!> figure 7 made again).
 module frb_chart_top
     use frb, only: wp, rigid_body, splitting_scheme, heavy_top, body_drift, body_observer, integrate, &
         status_ok
@@ -53,8 +52,7 @@ contains
         character(*), parameter :: titles(3) = [character(60) :: 'the paper''s top, |V| = 0.001, t = 100', &
             'Hairer-Vilmart top (0.6, 0.8, 1), t = 10', 'Hairer-Vilmart top (0.345, 0.653, 1), t = 10']
         real(wp), parameter :: moments(3, 3) = reshape([paper_moments, 0.6_wp, 0.8_wp, 1.0_wp, 0.345_wp, &
-            0.653_wp, &
-                                                        1.0_wp], [3, 3])
+            0.653_wp, 1.0_wp], [3, 3])
         real(wp), parameter :: m0(3, 3) = reshape([paper_m0, 1.8_wp, 0.4_wp, -0.9_wp, 1.8_wp, 0.4_wp, &
             -0.9_wp], [3, 3])
         real(wp), parameter :: u0(3, 3) = reshape([paper_u0, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, &
@@ -72,8 +70,7 @@ contains
             call measure(options, pairs, moments(:, s), m0(:, s), u0(:, s), duration(s), first_steps(s), &
                 errors, ns)
             call open_table(options, 'heavy-top-'//trim(names(s)), 'error against time spent: '// &
-                trim(titles(s))// &
-                '; a block per scheme and drift', &
+                trim(titles(s))//'; a block per scheme and drift', &
                 'steps, time [ns]: median, quartiles; error of attitude [rad]', unit)
             do i = 1, size(pairs)
                 write (unit, '(a)') '# '//trim(pairs(i)%scheme)//' with '//trim(pairs(i)%drift)
@@ -133,8 +130,8 @@ contains
             do i = 1, size(pairs)
                 call run(pairs(i), moments, m0, u0, duration, steps_at(options, first, k), 1, m, q, seconds)
                 errors(k, i) = max(1.0e-17_wp, real(2*min(norm2(q - q_end), norm2(q + q_end)), wp))
-                rounds(i) = max(1, min(1000, int(merge(0.3e-3_wp, 1.0e-3_wp, options%quick)/max(seconds, &
-                    1.0e-7_wp))))
+                rounds(i) = int(merge(0.3e-3_wp, 1.0e-3_wp, options%quick)/max(seconds, 1.0e-7_wp))
+                rounds(i) = max(1, min(1000, rounds(i)))
             end do
             do r = 1, repetitions
                 do i = 1, size(pairs)
@@ -246,8 +243,7 @@ contains
         character(80) :: text
 
         write (text, '(4(a,i0),a)') ' with linespoints lt ', pair%colour, ' dt ', pair%dash, ' pt ', &
-            pair%symbol, &
-            ' lw ', pair%width, ' ps 0.7'
+            pair%symbol, ' lw ', pair%width, ' ps 0.7'
         clause = trim(text)//' '//title
     end function curve
 
@@ -268,8 +264,7 @@ contains
         call open_script(options, 'torus', 1000, 520, unit)
         write (unit, '(a)') 'set multiplot layout 1,2', 'set size ratio -1', 'unset key', 'unset colorbox', &
             'set xlabel "m_1"', 'set ylabel "m_2"', 'set logscale cb', 'set xrange [-0.46:0.46]', &
-            'set yrange [-0.46:0.46]', &
-            'set palette defined (0 "#9ecae1", 1 "#0072B2", 2 "#002b4d")', &
+            'set yrange [-0.46:0.46]', 'set palette defined (0 "#9ecae1", 1 "#0072B2", 2 "#002b4d")', &
             'set title "Heavy top, 100 000 steps of 0.5"', &
             'plot "torus.dat" index 0 using 1:2:3 with image', &
             'set title "Close-up"', 'set xrange [0.3972:0.4002]', 'set yrange [-0.06:0.06]', &

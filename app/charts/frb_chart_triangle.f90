@@ -78,8 +78,7 @@ contains
         end do
         do k = 1, size(methods)
             write (line, '(2(a,f7.2))') '# '//methods(k)%key//' mean over the triangle ', &
-                mean_of(maps(2*k - 1, :, :)), &
-                ', largest ', largest_of(maps(2*k, :, :))
+                mean_of(maps(2*k - 1, :, :)), ', largest ', largest_of(maps(2*k, :, :))
             write (unit, '(a)') trim(line)
             call say('  '//trim(line(3:)))
         end do
@@ -130,17 +129,16 @@ contains
         call open_script(options, name, 1000, 560, unit)
         write (unit, '(a)') 'set multiplot title "log_{10} of the error of one step h = 1, '//title//'"', &
             'set palette defined (0 "#fde725", 1 "#5ec962", 2 "#21918c", 3 "#3b528b", 4 "#440154")', &
-            'set cbrange [-16.5:-10.5]', 'set xrange [0:1]', 'set yrange [0.5:1]', 'set xtics 0.25', &
+            'set cbrange [-16.5:-13.5]', 'set xrange [0:1]', 'set yrange [0.5:1]', 'set xtics 0.25', &
             'set ytics 0.1', &
-            'unset key', 'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0', 'set cbtics 1', &
+            'unset key', 'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0', 'set cbtics 0.5', &
             'set colorbox user origin 0.93,0.13 size 0.018,0.72'
         do row = 1, 2
             do k = 1, size(methods)
                 left = 0.075_wp + 0.285_wp*(k - 1)
                 write (unit, '(a,f6.4,a,f6.4)') 'set origin ', left, ',', merge(0.55_wp, 0.11_wp, row == 1)
                 write (unit, '(a)') 'set size 0.25,0.32', &
-                    'set title "'//escaped(methods(k)%label)//', '//trim(which(row))// &
-                    '" offset 0,-0.6', &
+                    'set title "'//escaped(methods(k)%label)//', '//trim(which(row))//'" offset 0,-0.6', &
                     either(k == 1, 'set ylabel "I_2/I_3" offset 1,0', 'unset ylabel'), &
                     either(row == 2, 'set xlabel "I_1/I_3" offset 0,0.5', 'unset xlabel')
                 write (unit, '(a,i0,a)') 'plot "'//name//'.dat" using 1:2:', 2*k + row, ' with image'

@@ -24,9 +24,7 @@ program frb_charts
     end interface
 
     character(*), parameter :: names(*) = [character(16) :: 'speed', 'scenes', 'cost', 'work-precision', &
-        'heavy-top', &
-        'failure', &
-        'growth', 'triangle', 'scale', 'orbits']
+        'heavy-top', 'failure', 'growth', 'triangle', 'scale', 'orbits']
     type(settings) :: options
     character(:), allocatable :: argument
     logical :: wanted(size(names))
