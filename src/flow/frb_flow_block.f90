@@ -11,7 +11,7 @@ module frb_flow_block
 
     public :: lanes, block_of_bodies, flow_block
 
-    integer, parameter :: lanes = 32    !! bodies in a block: a few vectors, and small enough for memory to keep up
+    integer, parameter :: lanes = 24    !! bodies in a block: a few vectors, and small enough for memory to keep up
 
     !> A block in sorted principal axes, with the parity of the sorting folded into m and the vector part of q.
     type :: block_of_bodies
