@@ -1,0 +1,391 @@
+!> free_flow at its limits, each against a closed form written for it alone: sphere, symmetric tops, rotation
+!> about an axis, the separatrix; next to the separatrix against Taylor series; extreme numbers; nothing at all.
+module frb_test_flow_limits
+    use, intrinsic :: iso_fortran_env, only: int64, qp => real128
+    use frb_checks, only: tally
+    use frb_flow_samples, only: stream, true_case, advanced, settled, near_separatrix, &
+        defect, no_turn, no_rotation
+    use frb_free_flow, only: free_flow
+    use frb_inertia, only: rigid_body
+    use frb_kinds, only: wp
+    use frb_reference_cases, only: reference_case, score_momentum, score_attitude
+    use frb_rotations, only: norm3
+    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+    implicit none
+    private
+
+    public :: test_flow_limits
+
+    real(wp), parameter :: eps = epsilon(1.0_wp)
+    !> Closed forms: error of m relative to |m| and of q, in units of eps (1 + angles turned in the step).
+    real(wp), parameter :: closed_form = 2*eps
+    !> Largest score on the separatrix and next to it.
+    real(wp), parameter :: separatrix_score = 2.0_wp
+    !> Norms, energy and momentum in space after one step of any size.
+    real(wp), parameter :: on_the_orbit = 16*eps
+
+contains
+
+    subroutine test_flow_limits(t)
+        type(tally), intent(inout) :: t
+
+        call t%open_suite('flow-limits', 40)
+        call check_sphere(t)
+        call check_symmetric_tops(t)
+        call check_axes(t)
+        call check_separatrix(t)
+        call check_both_sides(t)
+        call check_scales(t)
+        call check_nothing(t)
+        call t%close_suite()
+    end subroutine test_flow_limits
+
+    !> Rotation by an angle about a vector that is not zero, in quadruple precision.
+    pure function turn_about(axis, angle) result(q)
+        real(qp), intent(in) :: axis(3), angle
+        real(qp) :: q(4)
+
+        q = [cos(angle/2), sin(angle/2)*axis/norm2(axis)]
+    end function turn_about
+
+    pure function product4(p, q) result(pq)
+        real(qp), intent(in) :: p(4), q(4)
+        real(qp) :: pq(4)
+
+        pq = [p(1)*q(1) - p(2)*q(2) - p(3)*q(3) - p(4)*q(4), p(1)*q(2) + p(2)*q(1) + p(3)*q(4) - p(4)*q(3), &
+              p(1)*q(3) + p(3)*q(1) + p(4)*q(2) - p(2)*q(4), p(1)*q(4) + p(4)*q(1) + p(2)*q(3) - p(3)*q(2)]
+    end function product4
+
+    !> I1 = I2 = I3: m stays, the body turns about it by |m| h/I.
+    subroutine check_sphere(t)
+        type(tally), intent(inout) :: t
+        type(stream) :: random
+        real(wp) :: m0(3), moment, h, state(7), worst, moved
+        real(qp) :: angle
+        integer :: i
+
+        worst = 0.0_wp
+        moved = 0.0_wp
+        do i = 1, 300
+            m0 = random%log_uniform(-3.0_wp, 3.0_wp)*random%direction()
+            moment = random%log_uniform(-3.0_wp, 3.0_wp)
+            h = moment/norm3(m0)*sign(random%log_uniform(-9.0_wp, 5.0_wp), random%uniform(-1.0_wp, 1.0_wp))
+            state = advanced([moment, moment, moment], m0, h)
+            angle = norm2(real(m0, qp))*h/moment
+            moved = max(moved, maxval(abs(state(1:3) - m0)))
+            worst = max(worst, real(norm2(state(4:7) - turn_about(real(m0, qp), angle))/(1 + abs(angle)), wp))
+        end do
+        call t%at_most('sphere-keeps-its-momentum', moved, 0.0_wp)
+        call t%at_most('sphere-turns-about-its-momentum', worst, closed_form)
+    end subroutine check_sphere
+
+    !> Moments A, A, C with the symmetry axis j: in the body m turns about axis j by -(1/C - 1/A) m_j h;
+    !> the attitude is the turn about m by |m| h/A, then the one about axis j by (1/C - 1/A) m_j h.
+    subroutine check_symmetric_tops(t)
+        type(tally), intent(inout) :: t
+        character(*), parameter :: names(2) = ['oblate ', 'prolate']
+        type(stream) :: random
+        real(wp) :: moments(3), m0(3), h, state(7), worst(2), kept
+        real(qp) :: a, c, phi, m(3), q(4), axis(3), size
+        integer :: i, j, shape
+
+        do shape = 1, 2
+            worst = 0.0_wp
+            kept = 0.0_wp
+            do i = 1, 600
+                j = 1 + mod(i, 3)
+                moments = random%log_uniform(-2.0_wp, 2.0_wp)
+                moments(j) = moments(j)*merge(random%uniform(1.0_wp, 2.0_wp), random%log_uniform(-3.0_wp, 0.0_wp), &
+                                              shape == 1)
+                m0 = random%direction()
+                if (mod(i, 7) == 0) m0(j) = m0(j)*random%log_uniform(-16.0_wp, -1.0_wp)
+                h = minval(moments)*sign(random%log_uniform(-8.0_wp, 4.0_wp), random%uniform(-1.0_wp, 1.0_wp))
+                state = advanced(moments, m0, h)
+                a = moments(1 + mod(j, 3))
+                c = moments(j)
+                phi = (1/c - 1/a)*m0(j)*h
+                axis = 0.0_qp
+                axis(j) = 1.0_qp
+                m = cos(phi)*m0 - sin(phi)*[axis(2)*m0(3) - axis(3)*m0(2), axis(3)*m0(1) - axis(1)*m0(3), &
+                                            axis(1)*m0(2) - axis(2)*m0(1)] + (1 - cos(phi))*m0(j)*axis
+                q = product4(turn_about(real(m0, qp), norm2(real(m0, qp))*h/a), turn_about(axis, phi))
+                size = 1 + abs(h)*norm3(m0)*maxval(1/moments)
+                worst(1) = max(worst(1), real(norm2(state(1:3) - m)/norm2(m)/size, wp))
+                worst(2) = max(worst(2), real(norm2(state(4:7) - q)/size, wp))
+                kept = max(kept, abs(state(j) - m0(j)))
+            end do
+            call t%at_most(trim(names(shape))//'-top-momentum-is-trigonometric', worst(1), closed_form)
+            call t%at_most(trim(names(shape))//'-top-attitude-is-trigonometric', worst(2), closed_form)
+            call t%at_most(trim(names(shape))//'-top-keeps-the-momentum-of-its-axis', kept, 0.0_wp)
+        end do
+    end subroutine check_symmetric_tops
+
+    !> Momentum along one axis, the middle one among them: m stays, the body turns about it by m_j h/I_j.
+    subroutine check_axes(t)
+        type(tally), intent(inout) :: t
+        character(*), parameter :: names(3) = ['axis-1', 'axis-2', 'axis-3']
+        type(stream) :: random
+        real(wp) :: moments(3), m0(3), h, state(7), worst, moved, sideways
+        real(qp) :: axis(3), angle
+        integer :: i, j
+
+        do j = 1, 3
+            worst = 0.0_wp
+            moved = 0.0_wp
+            sideways = 0.0_wp
+            do i = 1, 200
+                moments = random%triangle()
+                m0 = 0.0_wp
+                m0(j) = sign(random%log_uniform(-2.0_wp, 2.0_wp), random%uniform(-1.0_wp, 1.0_wp))
+                h = random%log_uniform(-9.0_wp, 4.0_wp)/m0(j)
+                state = advanced(moments, m0, h)
+                axis = 0.0_qp
+                axis(j) = 1.0_qp
+                angle = real(m0(j), qp)*h/moments(j)
+                moved = max(moved, abs(state(j) - m0(j))/abs(m0(j)))
+                state(j) = 0.0_wp
+                sideways = max(sideways, maxval(abs(state(1:3))))
+                worst = max(worst, real(norm2(state(4:7) - turn_about(axis, angle)) &
+                                        /(1 + abs(m0(j)*h)/minval(moments)), wp))
+            end do
+            call t%at_most('momentum-stays-along-'//names(j), sideways, 0.0_wp)
+            call t%at_most('momentum-keeps-its-length-along-'//names(j), moved, 0.0_wp)
+            call t%at_most('body-turns-about-'//names(j), worst, closed_form)
+        end do
+    end subroutine check_axes
+
+    !> I = 2, 3, 6 and |m1| = |m3|: the separatrix to the last bit. m2 = |m| tanh(kappa), m1 and m3 fall as
+    !> sech(kappa), kappa grows by +-|m| h/6; and as the energy is that of a turn about axis 2, that axis
+    !> precesses about m evenly, by |m| h/I2.
+    subroutine check_separatrix(t)
+        type(tally), intent(inout) :: t
+        real(wp), parameter :: moments(3) = [2.0_wp, 3.0_wp, 6.0_wp]
+        type(stream) :: random
+        type(rigid_body) :: body
+        type(reference_case) :: it
+        real(wp) :: m0(3), m(3), a(3, 3), h, worst(2)
+        real(qp) :: g, kappa, psi, n0(3), f(3), m_true(3), e2(3), from(3, 3), to(3, 3), truth(3, 3), sign_13
+        integer :: i
+
+        body = rigid_body(moments)
+        worst = 0.0_wp
+        do i = 1, 150
+            m0(1) = sign(random%log_uniform(-6.0_wp, 0.0_wp), random%uniform(-1.0_wp, 1.0_wp))
+            m0(2) = random%uniform(-1.0_wp, 1.0_wp)
+            m0(3) = sign(m0(1), random%uniform(-1.0_wp, 1.0_wp))
+            h = sign(random%log_uniform(-4.0_wp, 2.0_wp), random%uniform(-1.0_wp, 1.0_wp))
+            m = m0
+            a = no_rotation
+            call free_flow(body, h, m, a)
+            g = norm2(real(m0, qp))
+            n0 = m0/g
+            sign_13 = sign(1.0_wp, m0(1)*m0(3))
+            kappa = sign(log((g + abs(m0(2)))/norm2(real([m0(1), m0(3)], qp))), real(m0(2), qp)) + sign_13*g*h/6
+            m_true = [real(m0(1), qp), 0.0_qp, real(m0(3), qp)]*(g/norm2(real([m0(1), m0(3)], qp))/cosh(kappa))
+            m_true(2) = g*tanh(kappa)
+            ! Axis 2 in space: at the angle of m_true to n0, its azimuth psi from where it was at the start.
+            f = [0.0_qp, 1.0_qp, 0.0_qp] - n0(2)*n0
+            f = f/norm2(f)
+            psi = g*h/3
+            e2 = n0*tanh(kappa) + (f*cos(psi) + cross4(n0, f)*sin(psi))/cosh(kappa)
+            ! The body's vectors m, axis 2 less its part along m, and their product, in both frames.
+            from(:, 1) = m_true/g
+            from(:, 2) = ([0.0_qp, 1.0_qp, 0.0_qp] - from(2, 1)*from(:, 1))*cosh(kappa)
+            from(:, 3) = cross4(from(:, 1), from(:, 2))
+            to(:, 1) = n0
+            to(:, 2) = (e2 - n0*tanh(kappa))*cosh(kappa)
+            to(:, 3) = cross4(to(:, 1), to(:, 2))
+            truth = matmul(to, transpose(from))
+            it = true_case(moments, m0, h)
+            it%m = m_true
+            worst(1) = max(worst(1), score_momentum(it, settled(m)))
+            worst(2) = max(worst(2), real(norm2(reshape(settled([a]) - [truth], [9]))/sqrt(2.0_qp), wp) &
+                           /(eps + it%sens_q))
+        end do
+        call t%at_most('separatrix-momentum-is-hyperbolic', worst(1), separatrix_score)
+        call t%at_most('separatrix-attitude-precesses-evenly', worst(2), separatrix_score)
+    end subroutine check_separatrix
+
+    pure function cross4(u, v) result(w)
+        real(qp), intent(in) :: u(3), v(3)
+        real(qp) :: w(3)
+
+        w = [u(2)*v(3) - u(3)*v(2), u(3)*v(1) - u(1)*v(3), u(1)*v(2) - u(2)*v(1)]
+    end function cross4
+
+    !> From 1e-2 to 1e-16 on both sides of the separatrix, steps of 0.1 to 25, one body and in a batch.
+    subroutine check_both_sides(t)
+        type(tally), intent(inout) :: t
+        type(stream) :: random
+        type(reference_case) :: it
+        real(wp) :: moments(3), m0(3), h, state(7), m(3, 40), q(4, 40), m1(3), q1(4), worst(2), batch(2)
+        integer :: i, j, side
+
+        worst = 0.0_wp
+        batch = 0.0_wp
+        do i = 2, 16
+            do side = -1, 1, 2
+                do j = 1, 3
+                    moments = random%triangle()
+                    m0 = near_separatrix(random, moments, side*10.0_wp**(-i))
+                    h = sign(random%log_uniform(-1.0_wp, 1.4_wp), random%uniform(-1.0_wp, 1.0_wp))
+                    it = true_case(moments, m0, h)
+                    state = advanced(moments, m0, h)
+                    worst(1) = max(worst(1), score_momentum(it, state(1:3)))
+                    worst(2) = max(worst(2), score_attitude(it, state(4:7)))
+                    m = spread(m0, 2, size(m, 2))
+                    q = spread(no_turn, 2, size(q, 2))
+                    call free_flow(rigid_body(moments), h, m, q)
+                    m1 = m(:, 5)
+                    q1 = q(:, 5)
+                    batch(1) = max(batch(1), score_momentum(it, settled(m1)))
+                    batch(2) = max(batch(2), score_attitude(it, settled(q1)))
+                end do
+            end do
+        end do
+        call t%at_most('both-sides-of-the-separatrix: m', worst(1), separatrix_score)
+        call t%at_most('both-sides-of-the-separatrix: q', worst(2), separatrix_score)
+        call t%at_most('both-sides-of-the-separatrix-in-a-batch: m', batch(1), separatrix_score)
+        call t%at_most('both-sides-of-the-separatrix-in-a-batch: q', batch(2), separatrix_score)
+    end subroutine check_both_sides
+
+    !> Other units, by powers of 2, give the same bits as long as no number is denormal; extreme momenta,
+    !> moments and times stay on the orbit.
+    subroutine check_scales(t)
+        type(tally), intent(inout) :: t
+        integer, parameter :: powers(8) = [-900, -500, -200, -20, 20, 200, 500, 900]
+        real(wp), parameter :: sizes(8) = [1.0e-290_wp, 1.0e-200_wp, 1.0e-100_wp, 1.0e-10_wp, 1.0_wp, &
+                                           1.0e50_wp, 1.0e150_wp, 1.0e300_wp]
+        type(stream) :: random
+        real(wp) :: moments(3), m0(3), h, state(7), other(7), by_m, by_i, worst(4), denormal, longest
+        integer :: i, j, k, l
+        logical :: good
+
+        by_m = 0.0_wp
+        by_i = 0.0_wp
+        denormal = 0.0_wp
+        do i = 1, 100
+            moments = random%triangle()
+            m0 = random%direction()
+            h = sign(random%log_uniform(-6.0_wp, 2.0_wp), random%uniform(-1.0_wp, 1.0_wp))
+            state = advanced(moments, m0, h)
+            do j = 1, size(powers)
+                other = advanced(moments, scale(m0, powers(j)), scale(h, -powers(j)))
+                by_m = max(by_m, maxval(abs([scale(other(1:3), -powers(j)), other(4:7)] - state)))
+                other = advanced(scale(moments, powers(j)), m0, scale(h, powers(j)))
+                by_i = max(by_i, maxval(abs(other - state)))
+            end do
+            ! Denormal momenta: 2^-1030 |m|, of spacing 2^-1074. The time stays below overflow.
+            other = advanced(moments, scale(m0, -1030), scale(h, 1000))
+            state = advanced(moments, scale(scale(m0, -1030), 1030), scale(h, -30))
+            denormal = max(denormal, maxval(abs(scale(other(1:3), 1030) - state(1:3)))/scale(1.0_wp, -44), &
+                           maxval(abs(other(4:7) - state(4:7)))/eps)
+        end do
+        call t%at_most('momentum-scales-as-one-over-time-to-the-last-bit', by_m, 0.0_wp)
+        call t%at_most('moments-scale-as-time-to-the-last-bit', by_i, 0.0_wp)
+        call t%at_most('denormal-momenta-move-to-their-last-bit', denormal, 1.0_wp)
+
+        worst = 0.0_wp
+        good = .true.
+        do i = 1, size(sizes)
+            do j = 1, size(sizes)
+                do k = 1, size(sizes)
+                    do l = 1, 3
+                        moments = sizes(i)*random%triangle()
+                        m0 = sizes(j)*random%direction()
+                        if (l == 3) moments([1, 3]) = moments([3, 1])
+                        state = advanced(moments, m0, sign(sizes(k), real(l, wp) - 1.5_wp))
+                        if (all(ieee_is_finite(state))) then
+                            worst = max(worst, defect(moments, m0, state))
+                        else
+                            good = .false.
+                        end if
+                    end do
+                end do
+            end do
+        end do
+        call t%ok('extreme-numbers-stay-finite', good)
+        call t%at_most('extreme-numbers-keep-q-unit', worst(1), on_the_orbit)
+        call t%at_most('extreme-numbers-keep-the-norm-of-m', worst(2), on_the_orbit)
+        call t%at_most('extreme-numbers-keep-the-energy', worst(3), on_the_orbit)
+        call t%at_most('extreme-numbers-keep-the-momentum-in-space', worst(4), on_the_orbit)
+
+        ! The largest numbers there are, at any time: sums and products must not overflow on the way.
+        worst = 0.0_wp
+        longest = huge(1.0_wp)
+        do i = 1, 20
+            m0 = huge(1.0_wp)*random%uniform(0.5_wp, 1.0_wp)*random%direction()
+            if (i == 1) m0 = [0.5_wp, 0.5_wp, -0.5_wp]*huge(1.0_wp)
+            moments = merge(random%triangle()*huge(1.0_wp), &
+                            random%triangle()*sqrt(huge(1.0_wp))*tiny(1.0_wp), mod(i, 2) == 0)
+            state = advanced(moments, m0, merge(longest, -1.0_wp/longest, mod(i, 4) < 2))
+            worst = max(worst, defect(moments, m0, state))
+        end do
+        call t%at_most('largest-numbers-stay-on-the-orbit', maxval(worst), on_the_orbit)
+        moments = [tiny(1.0_wp), 1.0_wp, huge(1.0_wp)]
+        worst = 0.0_wp
+        do i = 1, 20
+            m0 = random%direction()
+            state = advanced(moments, m0, sign(random%log_uniform(-300.0_wp, 300.0_wp), real(i, wp) - 10.5_wp))
+            worst = max(worst, defect(moments, m0, state))
+        end do
+        call t%at_most('moments-of-all-sizes-at-once-stay-on-the-orbit', maxval(worst([1, 2, 4])), on_the_orbit)
+    end subroutine check_scales
+
+    !> No time, no momentum, no bodies: nothing moves, to the last bit.
+    subroutine check_nothing(t)
+        type(tally), intent(inout) :: t
+        real(wp), parameter :: moments(3) = [0.4_wp, 0.7_wp, 1.0_wp], m0(3) = [0.3_wp, -0.9_wp, 0.5_wp]
+        real(wp), parameter :: q0(4) = [0.5_wp, -0.5_wp, 0.1_wp, 0.7_wp]
+        type(rigid_body) :: body, none(0)
+        real(wp) :: m(3), q(4), a(3, 3), h, many_m(3, 33), many_q(4, 33), no_m(3, 0), no_q(4, 0)
+        integer :: i, stat(4)
+        character(6), parameter :: names(3) = ['0     ', '-0    ', '1e-300']
+
+        body = rigid_body(moments)
+        do i = 1, 3
+            h = 0.0_wp
+            if (i == 2) h = -h
+            if (i == 3) h = 1.0e-300_wp
+            m = m0
+            q = q0
+            call free_flow(body, h, m, q)
+            many_m = spread(m0, 2, 33)
+            many_q = spread(q0, 2, 33)
+            call free_flow(body, h, many_m, many_q)
+            call t%ok('nothing-moves-in-a-time-of-'//trim(names(i)), same([m, q], [m0, q0]) .and. &
+                      same([many_m, many_q], &
+                           [spread(m0, 2, 33), spread(q0, 2, 33)]))
+        end do
+        m = 0.0_wp
+        m(2) = -m(2)
+        many_m = spread(m, 2, 33)
+        many_q = spread(q0, 2, 33)
+        q = q0
+        a = no_rotation
+        call free_flow(body, 3.0_wp, m, stat(1))
+        call free_flow(body, 3.0_wp, m, q, stat(2))
+        call free_flow(body, 3.0_wp, m, a, stat(3))
+        call free_flow(body, 3.0_wp, many_m, many_q, stat(4))
+        call t%ok('no-momentum-stays-none', same(m, [0.0_wp, -0.0_wp, 0.0_wp]) .and. &
+                  same([many_m], [spread(m, 2, 33)]))
+        call t%ok('no-momentum-is-no-turn', same([q, reshape(a, [9]), reshape(many_q, [132])], &
+                                                 [q0, reshape(no_rotation, [9]), &
+                                                  reshape(spread(q0, 2, 33), [132])]))
+        call t%ok('no-momentum-is-no-error', all(stat == 0))
+        call free_flow(body, 1.0_wp, no_m, stat(1))
+        call free_flow(body, 1.0_wp, no_m, no_q, stat(2))
+        call free_flow(none, 1.0_wp, no_m, stat(3))
+        call free_flow(none, 1.0_wp, no_m, no_q, stat(4))
+        call t%ok('no-bodies-are-no-error', all(stat == 0))
+    end subroutine check_nothing
+
+    !> Equal to the last bit, signs of zeros included.
+    pure function same(x, y) result(equal)
+        real(wp), intent(in) :: x(:), y(:)
+        logical :: equal
+
+        equal = all(transfer(x, [0_int64]) == transfer(y, [0_int64]))
+    end function same
+
+end module frb_test_flow_limits
