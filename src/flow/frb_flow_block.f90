@@ -11,7 +11,7 @@ module frb_flow_block
 
     public :: lanes, block_of_bodies, flow_block
 
-    integer, parameter :: lanes = 32    !! bodies in a block: a few vectors, and small enough for memory to keep up
+    integer, parameter :: lanes = 24    !! bodies in a block: a few vectors, and small enough for memory to keep up
 
     !> A block in sorted principal axes, with the parity of the sorting folded into m and the vector part of q.
     type :: block_of_bodies
@@ -33,9 +33,10 @@ contains
         real(wp) :: d1(lanes), d2(lanes), d3(lanes), v0(lanes), v2(lanes), v3(lanes)
         real(wp) :: long(lanes)
         real(wp) :: square, z0, z1, z2, z3, y2, y3, e1, e2, e3, w0, w1, w2, w3
-        integer :: l, reached, many_long
+        integer :: l, reached, resting, many_long
 
         many_long = 0
+        resting = 0
         do l = 1, lanes
             a(l) = bodies%alpha(l)*t
             b(l) = bodies%beta(l)*t
@@ -53,24 +54,18 @@ contains
             form(l) = merge(1.0_wp, -1.0_wp, g(l)*y3 <= a(l)*y2)
             square = (bodies%a1(l)*t)**2*gg(l)
             reached = merge(1, 0, max(p(l), r(l)) <= period_limit .and. square <= sin_cos_limit**2)
+            resting = resting + (1 - reached)
             bodies%served(l) = iand(bodies%served(l), reached)
             long(l) = merge(1.0_wp, 0.0_wp, max(p(l), r(l)) > short_limit .or. square > small_turn_limit)
             long(l) = merge(long(l), 0.0_wp, bodies%served(l) == 1)
             many_long = many_long + merge(1, 0, long(l) > 0.0_wp)
         end do
-        if (many_long < lanes) then
+        if (resting > 0) call rest_lanes()
+        if (many_long == 0) then
             call short_steps()
         else
-            d1 = 0.0_wp
-            d2 = 0.0_wp
-            d3 = 0.0_wp
-            v0 = 1.0_wp
-            v2 = 0.0_wp
-            v3 = 0.0_wp
-            cosm1 = 0.0_wp
-            angle = 0.0_wp
+            call mixed_steps()
         end if
-        if (many_long > 0) call long_steps()
         if (with_attitude) then
             do l = 1, lanes
                 call unit_increment(v0(l), v2(l), v3(l), z0, z2, z3)
@@ -92,6 +87,37 @@ contains
 
     contains
 
+        !> Lanes out of reach: no number of theirs may overflow on the way.
+        subroutine rest_lanes()
+            do l = 1, lanes
+                if (bodies%served(l) == 1) cycle
+                m1(l) = 0.0_wp
+                m2(l) = 0.0_wp
+                m3(l) = 0.0_wp
+                gg(l) = 0.0_wp
+                p(l) = 0.0_wp
+                r(l) = 0.0_wp
+                nu(l) = 0.0_wp
+            end do
+        end subroutine rest_lanes
+
+        !> Short and long lanes in one block: each loop runs over all lanes, and each lane takes its own result.
+        subroutine mixed_steps()
+            real(wp) :: p_kept(lanes), r_kept(lanes), nu_kept(lanes)
+
+            p_kept = p
+            r_kept = r
+            nu_kept = nu
+            p = merge(0.0_wp, p, long > 0.0_wp)
+            r = merge(0.0_wp, r, long > 0.0_wp)
+            nu = merge(0.0_wp, nu, long > 0.0_wp)
+            call short_steps()
+            p = p_kept
+            r = r_kept
+            nu = nu_kept
+            call long_steps()
+        end subroutine mixed_steps
+
         subroutine short_steps()
             real(wp) :: y, scd, u, w, k, k0, a23, b31, g12, first, second, sinc, n
 
@@ -102,7 +128,7 @@ contains
                 call short_series(p(l) + r(l), p(l)*r(l), y, scd)
                 u = p(l)*y
                 w = r(l)*y
-                k0 = a(l)*g(l)*m2(l)**2
+                k0 = merge(a(l)*g(l)*m2(l)**2, 0.0_wp, long(l) <= 0.0_wp)
                 k = k0*y
                 call short_momentum(u, w, 4*k0*(scd*scd), scd, m1(l), m2(l), m3(l), a23, b31, g12, &
                                     d1(l), d2(l), d3(l))
@@ -130,7 +156,7 @@ contains
 
             do l = 1, lanes
                 bg(l) = b(l)*sqrt(gg(l))
-                delta(l) = b(l)*(a(l)*m3(l)**2 - g(l)*m1(l)**2)
+                delta(l) = b(l)*((a(l)*m3(l)**2) - (g(l)*m1(l)**2))     ! 0 on the separatrix with FMA too
                 f(l) = 1.0_wp
                 triples(l) = 0.0_wp
                 squares(l) = 0.0_wp

@@ -14,13 +14,30 @@ module frb_flow_one
     implicit none
     private
 
-    public :: flow_one, flow_turned
+    public :: flow_body
 
     !> How far a step reaches: which series it takes.
     integer, parameter :: tiny_step = 1, short_step = 2, middle_step = 3, long_reach = 4
     real(wp), parameter :: largest_square_angle = 1.0e40_wp
 
 contains
+
+    !> Advances m, and q when present, of any body by h; code says why the input was refused, if it was.
+    subroutine flow_body(body, h, m, code, q)
+        type(rigid_body), intent(in) :: body
+        real(wp), intent(in) :: h
+        real(wp), intent(inout) :: m(3)
+        integer, intent(out) :: code
+        real(wp), intent(inout), optional :: q(4)
+
+        code = body%status
+        if (code /= status_ok) return
+        if (body%turned) then
+            call flow_turned(body, h, m, code, q)
+        else
+            call flow_one(body, h, m, code, q)
+        end if
+    end subroutine flow_body
 
     !> Advances m, and q when present, by h. `body` has status_ok and its own axes are principal.
     !> code: status_ok, or why the input was refused (it is then untouched).
@@ -44,15 +61,20 @@ contains
         m2 = m(i2)
         m3 = m(i3)
         t = 0.5_wp*h
-        rate = body%a(1)*t
-        ! One test lets pass what is finite, not zero and far from overflow; the rest is sorted out apart.
-        largest = abs(m1) + abs(m2) + abs(m3)
-        plain = ieee_is_finite(largest) .and. ieee_is_finite(rate)
-        if (plain) plain = largest < plain_largest .and. largest > plain_smallest .and. abs(rate) < plain_largest
+        ! What is finite, not zero and far from overflow goes on; the rest is sorted out apart. No comparison
+        ! sees a NaN, no sum or product overflows on the way.
+        largest = 0.25_wp*abs(m1) + 0.25_wp*abs(m2) + 0.25_wp*abs(m3)
+        plain = ieee_is_finite(largest) .and. ieee_is_finite(t)
+        if (plain) plain = largest < plain_largest .and. largest > plain_smallest .and. abs(t) < plain_largest &
+            .and. body%a(1) < plain_largest
         if (present(q)) then
-            largest = abs(q(1)) + abs(q(2)) + abs(q(3)) + abs(q(4))
+            largest = 0.25_wp*abs(q(1)) + 0.25_wp*abs(q(2)) + 0.25_wp*abs(q(3)) + 0.25_wp*abs(q(4))
             if (plain) plain = ieee_is_finite(largest)
-            if (plain) plain = largest > plain_smallest
+            if (plain) plain = largest > plain_smallest .and. largest < plain_largest
+        end if
+        if (plain) then
+            rate = body%a(1)*t
+            plain = abs(rate) < plain_largest
         end if
         if (.not. plain) then
             call flow_rescaled(body, h, m, code, q)
@@ -205,7 +227,7 @@ contains
         if (.not. all(ieee_is_finite(m))) return
         if (present(q)) then
             code = status_bad_attitude
-            size_q = abs(q(1)) + abs(q(2)) + abs(q(3)) + abs(q(4))
+            size_q = sum(0.25_wp*abs(q))
             if (.not. ieee_is_finite(size_q)) return
             if (size_q <= 0.0_wp) return
         end if
@@ -252,7 +274,7 @@ contains
         rt = g*x2 + b*x3
         p = g*pt
         r = a*rt
-        delta = b*(a*x3 - g*x1)     ! R - P, 0 on the separatrix
+        delta = b*((a*x3) - (g*x1))     ! R - P; the parentheses keep it 0 on the separatrix with FMA
         cn_is_c = delta <= 0.0_wp
         delta = abs(delta)
         pmax = max(p, r)

@@ -96,7 +96,7 @@ contains
         rt = gamma*n(2)**2 + beta*n(3)**2
         p = gamma*pt
         r = alpha*rt
-        delta = beta*(alpha*n(3)**2 - gamma*n(1)**2)
+        delta = beta*((alpha*n(3)**2) - (gamma*n(1)**2))     ! exactly 0 on the separatrix, with FMA too
         motion%periodic = abs(delta) > 0.0_wp
         if (.not. motion%periodic) return
         first_form = gamma*rt <= alpha*pt
