@@ -20,6 +20,17 @@ module frb_flow_block
         integer :: served(lanes)        !! 1 where flow_block advances the body, 0 where it leaves it alone
     end type block_of_bodies
 
+    !> What the loops of flow_block hand to one another, one number a lane.
+    type :: workspace
+        real(wp) :: m1(lanes), m2(lanes), m3(lanes), gg(lanes)      !! momentum before the step, its square
+        real(wp) :: a(lanes), b(lanes), g(lanes), p(lanes), r(lanes), nu(lanes)
+        real(wp) :: form(lanes)                                     !! 1: first form, -1: its mirror image
+        real(wp) :: long(lanes)                                     !! 1: beyond the short series, else 0
+        real(wp) :: d1(lanes), d2(lanes), d3(lanes)                 !! increments of the momentum
+        real(wp) :: v0(lanes), v2(lanes), v3(lanes)                 !! direction of z
+        real(wp) :: angle(lanes), cosm1(lanes)                      !! e = (1 + cosm1, angle m)
+    end type workspace
+
 contains
 
     !> Advances the bodies of a block by 2 t: m, and q when `with_attitude`. `served` on entry: 1 for bodies to
@@ -28,224 +39,226 @@ contains
         type(block_of_bodies), intent(inout) :: bodies
         real(wp), intent(in) :: t
         logical, intent(in) :: with_attitude
-        real(wp) :: m1(lanes), m2(lanes), m3(lanes), a(lanes), b(lanes), g(lanes), p(lanes), r(lanes)
-        real(wp) :: nu(lanes), gg(lanes), angle(lanes), cosm1(lanes), form(lanes)
-        real(wp) :: d1(lanes), d2(lanes), d3(lanes), v0(lanes), v2(lanes), v3(lanes)
-        real(wp) :: long(lanes)
+        type(workspace) :: work
         real(wp) :: square, z0, z1, z2, z3, y2, y3, e1, e2, e3, w0, w1, w2, w3
         integer :: l, reached, resting, many_long
 
         many_long = 0
         resting = 0
         do l = 1, lanes
-            a(l) = bodies%alpha(l)*t
-            b(l) = bodies%beta(l)*t
-            g(l) = bodies%gamma(l)*t
-            m1(l) = bodies%m(l, 1)
-            m2(l) = bodies%m(l, 2)
-            m3(l) = bodies%m(l, 3)
-            gg(l) = m1(l)**2 + m2(l)**2 + m3(l)**2
-            y2 = b(l)*m1(l)**2 + a(l)*m2(l)**2
-            y3 = g(l)*m2(l)**2 + b(l)*m3(l)**2
-            p(l) = g(l)*y2
-            r(l) = a(l)*y3
+            work%a(l) = bodies%alpha(l)*t
+            work%b(l) = bodies%beta(l)*t
+            work%g(l) = bodies%gamma(l)*t
+            work%m1(l) = bodies%m(l, 1)
+            work%m2(l) = bodies%m(l, 2)
+            work%m3(l) = bodies%m(l, 3)
+            work%gg(l) = work%m1(l)**2 + work%m2(l)**2 + work%m3(l)**2
+            y2 = work%b(l)*work%m1(l)**2 + work%a(l)*work%m2(l)**2
+            y3 = work%g(l)*work%m2(l)**2 + work%b(l)*work%m3(l)**2
+            work%p(l) = work%g(l)*y2
+            work%r(l) = work%a(l)*y3
             ! Of the two mirror forms the one with the smaller parameter nu of the third kind.
-            nu(l) = min(g(l)*y3, a(l)*y2)
-            form(l) = merge(1.0_wp, -1.0_wp, g(l)*y3 <= a(l)*y2)
-            square = (bodies%a1(l)*t)**2*gg(l)
-            reached = merge(1, 0, max(p(l), r(l)) <= period_limit .and. square <= sin_cos_limit**2)
+            work%nu(l) = min(work%g(l)*y3, work%a(l)*y2)
+            work%form(l) = merge(1.0_wp, -1.0_wp, work%g(l)*y3 <= work%a(l)*y2)
+            square = (bodies%a1(l)*t)**2*work%gg(l)
+            reached = merge(1, 0, max(work%p(l), work%r(l)) <= period_limit .and. square <= sin_cos_limit**2)
             resting = resting + (1 - reached)
             bodies%served(l) = iand(bodies%served(l), reached)
-            long(l) = merge(1.0_wp, 0.0_wp, max(p(l), r(l)) > short_limit .or. square > small_turn_limit)
-            long(l) = merge(long(l), 0.0_wp, bodies%served(l) == 1)
-            many_long = many_long + merge(1, 0, long(l) > 0.0_wp)
+            work%long(l) = merge(1.0_wp, 0.0_wp, &
+                                 max(work%p(l), work%r(l)) > short_limit .or. square > small_turn_limit)
+            work%long(l) = merge(work%long(l), 0.0_wp, bodies%served(l) == 1)
+            many_long = many_long + merge(1, 0, work%long(l) > 0.0_wp)
         end do
-        if (resting > 0) call rest_lanes()
-        if (many_long == 0) then
-            call short_steps()
-        else
-            call mixed_steps()
-        end if
+        if (resting > 0) call rest_lanes(bodies, work)
+        ! Short and long lanes in one block: each loop runs over all lanes, and each lane takes its own result.
+        call short_steps(bodies, t, with_attitude, work)
+        if (many_long > 0) call long_steps(bodies, t, work)
         if (with_attitude) then
             do l = 1, lanes
-                call unit_increment(v0(l), v2(l), v3(l), z0, z2, z3)
-                z1 = merge(0.0_wp, z3, form(l) > 0.0_wp)
-                z3 = merge(z3, 0.0_wp, form(l) > 0.0_wp)
-                e1 = angle(l)*m1(l)
-                e2 = angle(l)*m2(l)
-                e3 = angle(l)*m3(l)
-                call join_turns(cosm1(l), e1, e2, e3, z0, z1, z2, z3, w1, w2, w3)
-                call close_turn(cosm1(l), e1, e2, e3, z0, z1, z2, z3, w0, w1, w2, w3)
+                call unit_increment(work%v0(l), work%v2(l), work%v3(l), z0, z2, z3)
+                z1 = merge(0.0_wp, z3, work%form(l) > 0.0_wp)
+                z3 = merge(z3, 0.0_wp, work%form(l) > 0.0_wp)
+                e1 = work%angle(l)*work%m1(l)
+                e2 = work%angle(l)*work%m2(l)
+                e3 = work%angle(l)*work%m3(l)
+                call join_turns(work%cosm1(l), e1, e2, e3, z0, z1, z2, z3, w1, w2, w3)
+                call close_turn(work%cosm1(l), e1, e2, e3, z0, z1, z2, z3, w0, w1, w2, w3)
                 call turn(w0, w1, w2, w3, bodies%q(l, 0), bodies%q(l, 1), bodies%q(l, 2), bodies%q(l, 3))
             end do
         end if
         do l = 1, lanes
-            bodies%m(l, 1) = m1(l) + d1(l)
-            bodies%m(l, 2) = m2(l) + d2(l)
-            bodies%m(l, 3) = m3(l) + d3(l)
+            bodies%m(l, 1) = work%m1(l) + work%d1(l)
+            bodies%m(l, 2) = work%m2(l) + work%d2(l)
+            bodies%m(l, 3) = work%m3(l) + work%d3(l)
         end do
-
-    contains
-
-        !> Lanes out of reach: no number of theirs may overflow on the way.
-        subroutine rest_lanes()
-            do l = 1, lanes
-                if (bodies%served(l) == 1) cycle
-                m1(l) = 0.0_wp
-                m2(l) = 0.0_wp
-                m3(l) = 0.0_wp
-                gg(l) = 0.0_wp
-                p(l) = 0.0_wp
-                r(l) = 0.0_wp
-                nu(l) = 0.0_wp
-            end do
-        end subroutine rest_lanes
-
-        !> Short and long lanes in one block: each loop runs over all lanes, and each lane takes its own result.
-        subroutine mixed_steps()
-            real(wp) :: p_kept(lanes), r_kept(lanes), nu_kept(lanes)
-
-            p_kept = p
-            r_kept = r
-            nu_kept = nu
-            p = merge(0.0_wp, p, long > 0.0_wp)
-            r = merge(0.0_wp, r, long > 0.0_wp)
-            nu = merge(0.0_wp, nu, long > 0.0_wp)
-            call short_steps()
-            p = p_kept
-            r = r_kept
-            nu = nu_kept
-            call long_steps()
-        end subroutine mixed_steps
-
-        subroutine short_steps()
-            real(wp) :: y, scd, u, w, k, k0, a23, b31, g12, first, second, sinc, n
-
-            do l = 1, lanes
-                a23 = a(l)*(m2(l)*m3(l))
-                b31 = b(l)*(m3(l)*m1(l))
-                g12 = g(l)*(m1(l)*m2(l))
-                call short_series(p(l) + r(l), p(l)*r(l), y, scd)
-                u = p(l)*y
-                w = r(l)*y
-                k0 = merge(a(l)*g(l)*m2(l)**2, 0.0_wp, long(l) <= 0.0_wp)
-                k = k0*y
-                call short_momentum(u, w, 4*k0*(scd*scd), scd, m1(l), m2(l), m3(l), a23, b31, g12, &
-                                    d1(l), d2(l), d3(l))
-                if (with_attitude) then
-                    n = nu(l)*y
-                    first = 1 - merge(w, u, form(l) > 0.0_wp)
-                    second = merge(g(l), -a(l), form(l) > 0.0_wp)
-                    v0(l) = first*(1 - k)
-                    v2(l) = -second*first*(m2(l)*scd + b31*y)
-                    v3(l) = -form(l)*b(l)*(merge(m3(l), m1(l), form(l) > 0.0_wp)*scd &
-                                           - merge(g12, a23, form(l) > 0.0_wp)*y*first)
-                    angle(l) = merge(bodies%a1(l), bodies%a3(l), form(l) > 0.0_wp)*t &
-                               - form(l)*b(l)*n*sqrt(y)*short_third_kind(u, w, n)
-                    call small_turn(angle(l)*angle(l)*gg(l), sinc, cosm1(l))
-                    angle(l) = angle(l)*sinc
-                end if
-            end do
-        end subroutine short_steps
-
-        subroutine long_steps()
-            real(wp) :: s(lanes), y(lanes), c(lanes), d(lanes), cd(lanes), ec(lanes), es(lanes)
-            real(wp) :: delta(lanes), bg(lanes), f(lanes), triples(lanes), squares(lanes)
-            real(wp) :: norm, n1, n2, n3, cp, dr, sine, cosine, new_y, new_s, new_c, new_d, new_ec, new_es, n
-            integer :: most_triples, most_squares, over, i
-
-            do l = 1, lanes
-                bg(l) = b(l)*sqrt(gg(l))
-                delta(l) = b(l)*((a(l)*m3(l)**2) - (g(l)*m1(l)**2))     ! 0 on the separatrix with FMA too
-                f(l) = 1.0_wp
-                triples(l) = 0.0_wp
-                squares(l) = 0.0_wp
-            end do
-            ! Each body has its own numbers of doublings; the loops run to the largest of them.
-            most_triples = 0
-            do
-                over = 0
-                do l = 1, lanes
-                    n = merge(1.0_wp, 0.0_wp, long(l) > 0.0_wp .and. max(p(l), r(l))*f(l)*f(l) > square_limit)
-                    triples(l) = triples(l) + n
-                    f(l) = f(l)*(1 - 0.5_wp*n)
-                    over = over + merge(1, 0, n > 0.0_wp)
-                end do
-                if (over == 0) exit
-                most_triples = most_triples + 1
-            end do
-            most_squares = 0
-            do
-                over = 0
-                do l = 1, lanes
-                    n = merge(1.0_wp, 0.0_wp, long(l) > 0.0_wp .and. max(p(l), r(l), nu(l))*f(l)*f(l) > base_limit)
-                    squares(l) = squares(l) + n
-                    f(l) = f(l)*(1 - 0.5_wp*n)
-                    over = over + merge(1, 0, n > 0.0_wp)
-                end do
-                if (over == 0) exit
-                most_squares = most_squares + 1
-            end do
-            do l = 1, lanes
-                call base_series(p(l), r(l), f(l), s(l), y(l))
-                call base_angle(p(l), r(l), nu(l), bg(l), s(l), y(l), ec(l), es(l))
-            end do
-            do i = 1, most_squares
-                n = real(i, wp)
-                do l = 1, lanes
-                    new_y = y(l)
-                    new_ec = ec(l)
-                    new_es = es(l)
-                    call double_square(p(l), r(l), new_y, new_s, cd(l))
-                    call double_angle(nu(l), bg(l), y(l), new_s, cd(l), new_ec, new_es)
-                    y(l) = merge(new_y, y(l), squares(l) >= n)
-                    s(l) = merge(new_s, s(l), squares(l) >= n)
-                    ec(l) = merge(new_ec, ec(l), squares(l) >= n)
-                    es(l) = merge(new_es, es(l), squares(l) >= n)
-                end do
-            end do
-            do l = 1, lanes
-                c(l) = sqrt(1 - max(p(l), r(l))*y(l))
-                d(l) = sqrt(1 - min(p(l), r(l))*y(l))
-            end do
-            do i = 1, most_triples
-                n = real(i, wp)
-                do l = 1, lanes
-                    new_s = s(l)
-                    new_c = c(l)
-                    new_d = d(l)
-                    new_ec = ec(l)
-                    new_es = es(l)
-                    call double_triple(max(p(l), r(l)), abs(delta(l)), new_s, new_c, new_d)
-                    call double_angle(nu(l), bg(l), s(l)*s(l), new_s, new_c*new_d, new_ec, new_es)
-                    s(l) = merge(new_s, s(l), triples(l) >= n)
-                    c(l) = merge(new_c, c(l), triples(l) >= n)
-                    d(l) = merge(new_d, d(l), triples(l) >= n)
-                    ec(l) = merge(new_ec, ec(l), triples(l) >= n)
-                    es(l) = merge(new_es, es(l), triples(l) >= n)
-                end do
-            end do
-            do l = 1, lanes
-                cp = merge(c(l), d(l), delta(l) <= 0.0_wp)
-                dr = merge(d(l), c(l), delta(l) <= 0.0_wp)
-                call long_momentum(delta(l) <= 0.0_wp, a(l), b(l), g(l), s(l), cp, dr, m1(l), m2(l), m3(l), &
-                                   1.0_wp, n1, n2, n3, e1, e2, e3)
-                d1(l) = merge(e1, d1(l), long(l) > 0.0_wp)
-                d2(l) = merge(e2, d2(l), long(l) > 0.0_wp)
-                d3(l) = merge(e3, d3(l), long(l) > 0.0_wp)
-                v0(l) = merge(merge(dr, cp, form(l) > 0.0_wp), v0(l), long(l) > 0.0_wp)
-                v2(l) = merge(-merge(g(l)*dr, -a(l)*cp, form(l) > 0.0_wp)*s(l)*n2, v2(l), long(l) > 0.0_wp)
-                v3(l) = merge(-form(l)*b(l)*s(l)*merge(n3, n1, form(l) > 0.0_wp), v3(l), long(l) > 0.0_wp)
-                norm = sqrt(gg(l))
-                call sin_cos(form(l)*norm*(merge(bodies%a1(l), bodies%a3(l), form(l) > 0.0_wp)*t), sine, cosine)
-                n = 1.5_wp - 0.5_wp*(ec(l)*ec(l) + es(l)*es(l))     ! (ec, es) back to norm one
-                cosm1(l) = merge((cosine*ec(l) + sine*es(l))*n - 1, cosm1(l), long(l) > 0.0_wp)
-                norm = form(l)*n/max(norm, tiny(1.0_wp))
-                angle(l) = merge((sine*ec(l) - cosine*es(l))*norm, angle(l), long(l) > 0.0_wp)
-            end do
-        end subroutine long_steps
-
     end subroutine flow_block
+
+    !> Lanes out of reach: no number of theirs may overflow on the way.
+    subroutine rest_lanes(bodies, work)
+        type(block_of_bodies), intent(in) :: bodies
+        type(workspace), intent(inout) :: work
+        integer :: l
+
+        do l = 1, lanes
+            if (bodies%served(l) == 1) cycle
+            work%m1(l) = 0.0_wp
+            work%m2(l) = 0.0_wp
+            work%m3(l) = 0.0_wp
+            work%gg(l) = 0.0_wp
+            work%p(l) = 0.0_wp
+            work%r(l) = 0.0_wp
+            work%nu(l) = 0.0_wp
+        end do
+    end subroutine rest_lanes
+
+    !> Short steps: increments of m; direction of z and e when `with_attitude`. Lanes that the short series do
+    !> not reach run along with p = r = 0.
+    subroutine short_steps(bodies, t, with_attitude, work)
+        type(block_of_bodies), intent(in) :: bodies
+        real(wp), intent(in) :: t
+        logical, intent(in) :: with_attitude
+        type(workspace), intent(inout) :: work
+        real(wp) :: p, r, y, scd, u, w, k, k0, a23, b31, g12, first, second, sinc, n
+        integer :: l
+
+        do l = 1, lanes
+            a23 = work%a(l)*(work%m2(l)*work%m3(l))
+            b31 = work%b(l)*(work%m3(l)*work%m1(l))
+            g12 = work%g(l)*(work%m1(l)*work%m2(l))
+            p = merge(work%p(l), 0.0_wp, work%long(l) <= 0.0_wp)
+            r = merge(work%r(l), 0.0_wp, work%long(l) <= 0.0_wp)
+            call short_series(p + r, p*r, y, scd)
+            u = p*y
+            w = r*y
+            k0 = merge(work%a(l)*work%g(l)*work%m2(l)**2, 0.0_wp, work%long(l) <= 0.0_wp)
+            k = k0*y
+            call short_momentum(u, w, 4*k0*(scd*scd), scd, work%m1(l), work%m2(l), work%m3(l), a23, b31, g12, &
+                                work%d1(l), work%d2(l), work%d3(l))
+            if (with_attitude) then
+                n = merge(work%nu(l)*y, 0.0_wp, work%long(l) <= 0.0_wp)
+                first = 1 - merge(w, u, work%form(l) > 0.0_wp)
+                second = merge(work%g(l), -work%a(l), work%form(l) > 0.0_wp)
+                work%v0(l) = first*(1 - k)
+                work%v2(l) = -second*first*(work%m2(l)*scd + b31*y)
+                work%v3(l) = -work%form(l)*work%b(l)*(merge(work%m3(l), work%m1(l), work%form(l) > 0.0_wp)*scd &
+                                                      - merge(g12, a23, work%form(l) > 0.0_wp)*y*first)
+                work%angle(l) = merge(bodies%a1(l), bodies%a3(l), work%form(l) > 0.0_wp)*t &
+                                - work%form(l)*work%b(l)*n*sqrt(y)*short_third_kind(u, w, n)
+                call small_turn(work%angle(l)*work%angle(l)*work%gg(l), sinc, work%cosm1(l))
+                work%angle(l) = work%angle(l)*sinc
+            end if
+        end do
+    end subroutine short_steps
+
+    !> Steps of lanes beyond the short series, by doubling; others keep what they have.
+    subroutine long_steps(bodies, t, work)
+        type(block_of_bodies), intent(in) :: bodies
+        real(wp), intent(in) :: t
+        type(workspace), intent(inout) :: work
+        real(wp) :: s(lanes), y(lanes), c(lanes), d(lanes), cd(lanes), ec(lanes), es(lanes)
+        real(wp) :: delta(lanes), bg(lanes), f(lanes), triples(lanes), squares(lanes)
+        real(wp) :: norm, n1, n2, n3, cp, dr, sine, cosine, new_y, new_s, new_c, new_d, new_ec, new_es, n
+        real(wp) :: e1, e2, e3
+        integer :: most_triples, most_squares, over, i, l
+
+        do l = 1, lanes
+            bg(l) = work%b(l)*sqrt(work%gg(l))
+            ! The parentheses keep this 0 on the separatrix with FMA too.
+            delta(l) = work%b(l)*((work%a(l)*work%m3(l)**2) - (work%g(l)*work%m1(l)**2))
+            f(l) = 1.0_wp
+            triples(l) = 0.0_wp
+            squares(l) = 0.0_wp
+        end do
+        ! Each body has its own numbers of doublings; the loops run to the largest of them.
+        most_triples = 0
+        do
+            over = 0
+            do l = 1, lanes
+                n = max(work%p(l), work%r(l))*f(l)*f(l)
+                n = merge(1.0_wp, 0.0_wp, work%long(l) > 0.0_wp .and. n > square_limit)
+                triples(l) = triples(l) + n
+                f(l) = f(l)*(1 - 0.5_wp*n)
+                over = over + merge(1, 0, n > 0.0_wp)
+            end do
+            if (over == 0) exit
+            most_triples = most_triples + 1
+        end do
+        most_squares = 0
+        do
+            over = 0
+            do l = 1, lanes
+                n = max(work%p(l), work%r(l), work%nu(l))*f(l)*f(l)
+                n = merge(1.0_wp, 0.0_wp, work%long(l) > 0.0_wp .and. n > base_limit)
+                squares(l) = squares(l) + n
+                f(l) = f(l)*(1 - 0.5_wp*n)
+                over = over + merge(1, 0, n > 0.0_wp)
+            end do
+            if (over == 0) exit
+            most_squares = most_squares + 1
+        end do
+        do l = 1, lanes
+            call base_series(work%p(l), work%r(l), f(l), s(l), y(l))
+            call base_angle(work%p(l), work%r(l), work%nu(l), bg(l), s(l), y(l), ec(l), es(l))
+        end do
+        do i = 1, most_squares
+            n = real(i, wp)
+            do l = 1, lanes
+                new_y = y(l)
+                new_ec = ec(l)
+                new_es = es(l)
+                call double_square(work%p(l), work%r(l), new_y, new_s, cd(l))
+                call double_angle(work%nu(l), bg(l), y(l), new_s, cd(l), new_ec, new_es)
+                y(l) = merge(new_y, y(l), squares(l) >= n)
+                s(l) = merge(new_s, s(l), squares(l) >= n)
+                ec(l) = merge(new_ec, ec(l), squares(l) >= n)
+                es(l) = merge(new_es, es(l), squares(l) >= n)
+            end do
+        end do
+        do l = 1, lanes
+            c(l) = sqrt(1 - max(work%p(l), work%r(l))*y(l))
+            d(l) = sqrt(1 - min(work%p(l), work%r(l))*y(l))
+        end do
+        do i = 1, most_triples
+            n = real(i, wp)
+            do l = 1, lanes
+                new_s = s(l)
+                new_c = c(l)
+                new_d = d(l)
+                new_ec = ec(l)
+                new_es = es(l)
+                call double_triple(max(work%p(l), work%r(l)), abs(delta(l)), new_s, new_c, new_d)
+                call double_angle(work%nu(l), bg(l), s(l)*s(l), new_s, new_c*new_d, new_ec, new_es)
+                s(l) = merge(new_s, s(l), triples(l) >= n)
+                c(l) = merge(new_c, c(l), triples(l) >= n)
+                d(l) = merge(new_d, d(l), triples(l) >= n)
+                ec(l) = merge(new_ec, ec(l), triples(l) >= n)
+                es(l) = merge(new_es, es(l), triples(l) >= n)
+            end do
+        end do
+        do l = 1, lanes
+            cp = merge(c(l), d(l), delta(l) <= 0.0_wp)
+            dr = merge(d(l), c(l), delta(l) <= 0.0_wp)
+            call long_momentum(delta(l) <= 0.0_wp, work%a(l), work%b(l), work%g(l), s(l), cp, dr, &
+                               work%m1(l), work%m2(l), work%m3(l), 1.0_wp, n1, n2, n3, e1, e2, e3)
+            work%d1(l) = merge(e1, work%d1(l), work%long(l) > 0.0_wp)
+            work%d2(l) = merge(e2, work%d2(l), work%long(l) > 0.0_wp)
+            work%d3(l) = merge(e3, work%d3(l), work%long(l) > 0.0_wp)
+            n = merge(dr, cp, work%form(l) > 0.0_wp)
+            work%v0(l) = merge(n, work%v0(l), work%long(l) > 0.0_wp)
+            n = -merge(work%g(l), -work%a(l), work%form(l) > 0.0_wp)*n*s(l)*n2
+            work%v2(l) = merge(n, work%v2(l), work%long(l) > 0.0_wp)
+            n = -work%form(l)*work%b(l)*s(l)*merge(n3, n1, work%form(l) > 0.0_wp)
+            work%v3(l) = merge(n, work%v3(l), work%long(l) > 0.0_wp)
+            norm = sqrt(work%gg(l))
+            n = merge(bodies%a1(l), bodies%a3(l), work%form(l) > 0.0_wp)*t
+            call sin_cos(work%form(l)*norm*n, sine, cosine)
+            n = 1.5_wp - 0.5_wp*(ec(l)*ec(l) + es(l)*es(l))     ! (ec, es) back to norm one
+            work%cosm1(l) = merge((cosine*ec(l) + sine*es(l))*n - 1, work%cosm1(l), work%long(l) > 0.0_wp)
+            norm = work%form(l)*n/max(norm, tiny(1.0_wp))
+            work%angle(l) = merge((sine*ec(l) - cosine*es(l))*norm, work%angle(l), work%long(l) > 0.0_wp)
+        end do
+    end subroutine long_steps
+
 
     include 'flow_formulas.inc'
 

@@ -31,7 +31,7 @@ contains
         if (code == status_ok .and. .not. ieee_is_finite(h)) code = status_bad_time
         if (code /= status_ok) return
         refused = status_ok
-        !$omp parallel do if (n >= 64*lanes) private(block, last, one, count) reduction(max: refused) schedule(static)
+        !$omp parallel do if (n >= 64*lanes) private(block, last, one, count) reduction(max: refused)
         do first = 1, n, lanes
             last = min(first + lanes - 1, n)
             count = last - first + 1

@@ -4,8 +4,8 @@
 !> Closed form: m by the addition theorem of the elliptic functions written in m itself; attitude q e z with e a
 !> rotation about m by an angle with one integral of the third kind, z algebraic. Every update is an increment.
 module frb_flow_one
-    use frb_flow_limits, only: short_limit, tiny_limit, tiny_turn_limit, small_turn_limit, middle_turn_limit, base_limit, &
-        square_limit, period_limit, sin_cos_limit, plain_largest, plain_smallest
+    use frb_flow_limits, only: short_limit, tiny_limit, tiny_turn_limit, small_turn_limit, middle_turn_limit, &
+        base_limit, square_limit, period_limit, sin_cos_limit, plain_largest, plain_smallest
     use frb_flow_periods, only: reduce_periods
     use frb_inertia, only: rigid_body
     use frb_kinds, only: wp
