@@ -20,6 +20,7 @@ program check
     use frb_test_quadrature, only: test_quadrature
     use frb_test_free_flow, only: test_free_flow
     use frb_test_flow_limits, only: test_flow_limits
+    use frb_test_flow_laws, only: test_flow_laws
     implicit none
     type(tally) :: t
     character(16) :: argument
@@ -41,6 +42,7 @@ program check
     call test_quadrature(t)
     call test_free_flow(t)
     call test_flow_limits(t)
+    call test_flow_laws(t)
 
     call get_command_argument(1, argument)
     if (argument == '--fail') then
