@@ -260,8 +260,9 @@ contains
         logical, intent(in) :: with_attitude
         real(wp), intent(out) :: d1, d2, d3, v0, v2, v3, cosm1, angle
         real(wp) :: a, b, g, x1, x2, x3, pt, rt, p, r, pmax, pmin, delta, nu, bg, norm
-        real(wp) :: fraction, whole, f, scale_p, s, y, y1, c, d, cd, ec, es, n1, n2, n3, cp, dr, sine, cosine
-        logical :: cn_is_c, first_form, odd
+        real(wp) :: fraction, turned, whole, f, span
+        real(wp) :: s, y, y1, c, d, cd, ec, es, n1, n2, n3, cp, dr, sine, cosine
+        logical :: cn_is_c, first_form
         integer :: squares, triples
 
         a = body%alpha*t
@@ -285,20 +286,19 @@ contains
         bg = b*norm
         fraction = 1.0_wp
         whole = 0.0_wp
-        odd = .false.
-        if (pmax > period_limit) call reduce_periods(pmax, delta, nu, fraction, odd, whole)
+        turned = 1.0_wp
+        if (pmax > period_limit) call reduce_periods(pmax, delta, nu, with_attitude, fraction, turned, whole)
         f = abs(fraction)
         squares = 0
         triples = 0
-        scale_p = pmax*(f*f)
-        do while (scale_p > square_limit)
-            scale_p = 0.25_wp*scale_p
+        span = fraction*fraction
+        do while (pmax*span > square_limit)
+            span = 0.25_wp*span
             f = 0.5_wp*f
             triples = triples + 1
         end do
-        scale_p = max(scale_p, nu*(f*f))
-        do while (scale_p > base_limit)
-            scale_p = 0.25_wp*scale_p
+        do while (max(pmax, nu)*span > base_limit)
+            span = 0.25_wp*span
             f = 0.5_wp*f
             squares = squares + 1
         end do
@@ -320,10 +320,8 @@ contains
         end do
         s = sign(s, fraction)
         es = sign(1.0_wp, fraction)*es
-        if (odd) then
-            s = -s
-            c = -c
-        end if
+        s = turned*s
+        c = turned*c
         cp = merge(c, d, cn_is_c)
         dr = merge(d, c, cn_is_c)
         call long_momentum(cn_is_c, a, b, g, s, cp, dr, m1, m2, m3, body%parity, n1, n2, n3, d1, d2, d3)

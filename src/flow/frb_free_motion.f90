@@ -101,7 +101,7 @@ contains
         if (.not. motion%periodic) return
         first_form = gamma*rt <= alpha*pt
         nu = merge(gamma*rt, alpha*pt, first_form)
-        call quarter_period(max(p, r), abs(delta), nu, quarter, mean)
+        call quarter_period(max(p, r), abs(delta), nu, .true., quarter, mean)
         if (first_form) then
             motion%half_angle = 2*quarter*g*(a(1) - beta*nu*mean)
             motion%turns_sign = merge(1.0_wp, -1.0_wp, delta <= 0.0_wp)
