@@ -21,6 +21,7 @@ program check
     use frb_test_free_flow, only: test_free_flow
     use frb_test_flow_limits, only: test_flow_limits
     use frb_test_flow_laws, only: test_flow_laws
+    use frb_test_flow_runs, only: test_flow_runs
     implicit none
     type(tally) :: t
     character(16) :: argument
@@ -43,6 +44,7 @@ program check
     call test_free_flow(t)
     call test_flow_limits(t)
     call test_flow_laws(t)
+    call test_flow_runs(t)
 
     call get_command_argument(1, argument)
     if (argument == '--fail') then

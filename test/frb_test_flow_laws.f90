@@ -26,7 +26,7 @@ module frb_test_flow_laws
     !> The same step in other words.
     real(wp), parameter :: same_step = 16*eps
     !> Norms, energy, momentum in space after one step.
-    real(wp), parameter :: on_the_orbit = 16*eps
+    real(wp), parameter :: on_the_orbit = 32*eps
     !> Increments from the identity, relative to their own size.
     real(wp), parameter :: increments = 8*eps
     real(wp), parameter :: largest_score = 2.0_wp
