@@ -1,4 +1,5 @@
 !> The rivals of the charts in quadruple precision: the very texts that the chart program times.
+!> fpm does not watch included text: after a change of it, build afresh.
 module frb_quad_dmv
     use, intrinsic :: iso_fortran_env, only: rk => real128
     implicit none

@@ -6,6 +6,7 @@ module frb_runge_kutta
 
     public :: rk4_steps, dormand_prince
 
+    ! fpm does not watch included text: after a change of it, build afresh.
     include 'rivals/runge_kutta.inc'
 
 end module frb_runge_kutta
