@@ -88,7 +88,7 @@ contains
             'set ylabel "time per step / cheapest discrete Moser-Veselov"', &
             'set key outside right center vertical spacing 1.15 samplen 2.2 Left reverse', &
             'set title "Cost of one step, its accuracy aside"', &
-            'set label "Moser-Veselov does\nnot converge here" at 3,0.045 center textcolor rgb '// &
+            'set label "Moser-Veselov\ndoes not\nconverge" at 3.6,75 center textcolor rgb '// &
             '"#0072B2"', &
             'set object 1 rectangle from 1.3,0.03 to 10,100 behind fillstyle solid noborder '// &
             'fillcolor rgb "#eef3f8"', 'set yrange [0.03:100]', 'set xrange [0.001:10]', &

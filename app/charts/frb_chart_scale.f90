@@ -92,8 +92,8 @@ contains
             character(:), allocatable :: label
 
             call open_script(options, 'scale', 900, 520, unit)
-            write (unit, '(a)') 'set logscale x', 'set format x "10^{%T}"', 'set xrange [0.7:1.5e7]', &
-                'set yrange [0:*]', &
+            write (unit, '(a)') 'set logscale xy', 'set format x "10^{%T}"', 'set xrange [0.7:1.5e7]', &
+                'set yrange [3:1000]', &
                 'set xlabel "number of bodies"', 'set ylabel "time per body and step  [ns]"', &
                 'set title "Many bodies, h = 0.1"', &
                 'set key outside right center vertical samplen 2.2 Left reverse', 'plot \'
