@@ -22,6 +22,7 @@ program check
     use frb_test_flow_limits, only: test_flow_limits
     use frb_test_flow_laws, only: test_flow_laws
     use frb_test_flow_runs, only: test_flow_runs
+    use frb_test_flow_batches, only: test_flow_batches
     implicit none
     type(tally) :: t
     character(16) :: argument
@@ -45,6 +46,7 @@ program check
     call test_flow_limits(t)
     call test_flow_laws(t)
     call test_flow_runs(t)
+    call test_flow_batches(t)
 
     call get_command_argument(1, argument)
     if (argument == '--fail') then

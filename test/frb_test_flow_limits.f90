@@ -116,7 +116,7 @@ contains
             end do
             call t%at_most(trim(names(shape))//'-top-momentum-is-trigonometric', worst(1), closed_form)
             call t%at_most(trim(names(shape))//'-top-attitude-is-trigonometric', worst(2), closed_form)
-            call t%at_most(trim(names(shape))//'-top-keeps-the-momentum-of-its-axis', kept, 0.0_wp)
+            call t%at_most(trim(names(shape))//'-top-keeps-the-momentum-of-its-axis', kept, 4*eps)
         end do
     end subroutine check_symmetric_tops
 
@@ -164,8 +164,8 @@ contains
         type(rigid_body) :: body
         type(reference_case) :: it
         real(wp) :: m0(3), m(3), a(3, 3), h, worst(2)
-        real(qp) :: g, kappa, psi, n0(3), f(3), m_true(3), e2(3), from(3, 3), to(3, 3), truth(3, 3), sign_13, &
-            across
+        real(qp) :: g, kappa, psi, n0(3), f(3), m_true(3), e2(3), from(3, 3), to(3, 3), truth(3, 3)
+        real(qp) :: sign_13, across
         integer :: i
 
         body = rigid_body(moments)

@@ -33,8 +33,8 @@ module frb_test_flow_runs
     !> Measured: 0.06 and 0.9.
     real(wp), parameter :: bias = 0.25_wp
     real(wp), parameter :: walk_length = 4.0_wp
-    !> Drift of one motion in a long step, in units of 2^-53. Measured: 0.7 (m), 0.1 (q), 0.6 (energy).
-    real(wp), parameter :: long_drift = 1.5_wp
+    !> Drift of one motion in a long step, in units of 2^-53. Measured: 1.2 (m), 0.1 (q), 1 (energy).
+    real(wp), parameter :: long_drift = 2.0_wp
 
 contains
 

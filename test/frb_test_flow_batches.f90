@@ -1,0 +1,483 @@
+!> free_flow: refused input leaves the state untouched, in batches only that of the refused bodies; results
+!> of a batch do not depend on how it is split; a fuzz over bodies, momenta and steps of all sizes.
+module frb_test_flow_batches
+    use, intrinsic :: iso_fortran_env, only: int64, output_unit
+    use frb_checks, only: tally
+    use frb_flow_samples, only: stream, advanced, settled, defect, near_separatrix, no_turn, no_rotation
+    use frb_free_flow, only: free_flow
+    use frb_inertia, only: rigid_body
+    use frb_kinds, only: wp, unit_roundoff
+    use frb_rotations, only: norm3, quat_to_matrix
+    use frb_status, only: status_ok, status_bad_moments, status_bad_tensor, status_bad_momentum, &
+        status_bad_attitude, status_bad_time, status_bad_count
+    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_value, ieee_quiet_nan, ieee_positive_inf, &
+        ieee_negative_inf
+    implicit none
+    private
+
+    public :: test_flow_batches
+
+    real(wp), parameter :: eps = epsilon(1.0_wp)
+    real(wp), parameter :: moments(3) = [0.4_wp, 1.0_wp, 0.7_wp]
+    real(wp), parameter :: m0(3) = [0.3_wp, -0.9_wp, 0.5_wp], q0(4) = [0.5_wp, -0.5_wp, 0.1_wp, 0.7_wp]
+    !> Norms, momentum in space, and the energy (relative to the kinetic energy of |m|^2/(2 I1)), one step.
+    real(wp), parameter :: on_the_orbit = 64*eps
+    !> The same where a deviation grows by 1e4 or more: next to the separatrix, over many decay times.
+    real(wp), parameter :: next_to_separatrix = 1.0e-11_wp
+    !> There and back, and a batch against one by one, in units of a rough inherent sensitivity; measured 16
+    !> and 0.4.
+    real(wp), parameter :: returned = 40.0_wp
+    real(wp), parameter :: same_in_batch = 2.0_wp
+    real(wp), parameter :: most_sensitive = 1.0e-11_wp
+
+contains
+
+    subroutine test_flow_batches(t)
+        type(tally), intent(inout) :: t
+
+        call t%open_suite('flow-batches', 36)
+        call check_refused(t)
+        call check_refused_in_batches(t)
+        call check_counts(t)
+        call check_splits(t)
+        call check_fuzz(t)
+        call t%close_suite()
+    end subroutine test_flow_batches
+
+    !> Inf, -Inf and NaN, quietly.
+    function not_a_number(i) result(x)
+        integer, intent(in) :: i
+        real(wp) :: x
+
+        select case (mod(i, 3))
+        case (0)
+            x = ieee_value(1.0_wp, ieee_quiet_nan)
+        case (1)
+            x = ieee_value(1.0_wp, ieee_positive_inf)
+        case default
+            x = ieee_value(1.0_wp, ieee_negative_inf)
+        end select
+    end function not_a_number
+
+    !> Equal to the last bit, NaN included.
+    pure function same(x, y) result(equal)
+        real(wp), intent(in) :: x(:), y(:)
+        logical :: equal
+
+        equal = size(x) == size(y)
+        if (equal) equal = all(transfer(x, [0_int64]) == transfer(y, [0_int64]))
+    end function same
+
+    !> Each status, principal body and tensor body, momentum alone, quaternion, matrix.
+    subroutine check_refused(t)
+        type(tally), intent(inout) :: t
+        type(rigid_body) :: good(2), bad(3)
+        real(wp) :: tensor(3, 3), zero(4), bad_m(3), bad_q(4), bad_a(3, 3)
+        logical :: right(7)
+        integer :: i, j, k
+
+        tensor = 0.1_wp
+        do i = 1, 3
+            tensor(i, i) = moments(i)
+        end do
+        good = [rigid_body(moments), rigid_body(tensor)]
+        bad(1) = rigid_body([1.0_wp, -1.0_wp, 1.0_wp])
+        tensor(1, 2) = 0.2_wp
+        bad(2) = rigid_body(tensor)
+        right = .true.
+        right(1) = bad(1)%status == status_bad_moments .and. bad(3)%status == status_bad_moments &
+            .and. bad(2)%status == status_bad_tensor .and. all(good%status == status_ok)
+        do i = 1, 3
+            if (.not. refused(bad(i), 1.0_wp, m0, q0, no_rotation, bad(i)%status, &
+                                              .true., .true.)) right(2) = .false.
+        end do
+        zero = 0.0_wp
+        zero(3) = -zero(3)
+        do k = 1, 2
+            do i = 1, 3
+                if (.not. refused(good(k), not_a_number(i), m0, q0, no_rotation, &
+                                                  status_bad_time, .true., .true.)) right(3) = .false.
+                do j = 1, 3
+                    bad_m = m0
+                    bad_m(j) = not_a_number(i)
+                    if (.not. refused(good(k), 1.0_wp, bad_m, q0, no_rotation, &
+                                                      status_bad_momentum, .true., .true.)) right(4) = .false.
+                end do
+                do j = 1, 4
+                    bad_q = q0
+                    bad_q(j) = not_a_number(i)
+                    if (.not. refused(good(k), 1.0_wp, m0, bad_q, no_rotation, &
+                                                      status_bad_attitude, .false., .true.)) right(5) = .false.
+                end do
+                do j = 1, 9
+                    bad_a = no_rotation
+                    bad_a(1 + mod(j, 3), 1 + mod((j - mod(j, 3))/3, 3)) = not_a_number(i)
+                    if (.not. refused(good(k), 1.0_wp, m0, q0, bad_a, status_bad_attitude, &
+                                                      .false., .false.)) right(6) = .false.
+                end do
+            end do
+            if (.not. refused(good(k), 1.0_wp, m0, zero, no_rotation, status_bad_attitude, &
+                                              .false., .true.)) right(7) = .false.
+        end do
+        call t%ok('bodies-that-could-not-be-made-say-why', right(1))
+        call t%ok('such-bodies-are-refused-with-their-status', right(2))
+        call t%ok('times-that-are-not-finite-are-refused', right(3))
+        call t%ok('momenta-that-are-not-finite-are-refused', right(4))
+        call t%ok('quaternions-that-are-not-finite-are-refused', right(5))
+        call t%ok('matrices-that-are-not-finite-are-refused', right(6))
+        call t%ok('quaternions-of-norm-zero-are-refused', right(7))
+        ! The same with no momentum and no time: what is wrong is wrong.
+        call t%ok('no-momentum-does-not-hide-a-bad-attitude', &
+                  refused(good(1), 1.0_wp, [0.0_wp, 0.0_wp, 0.0_wp], zero, no_rotation, status_bad_attitude, &
+                          .false., .true.))
+        call t%ok('no-time-does-not-hide-a-bad-momentum', &
+                  refused(good(1), 0.0_wp, [not_a_number(0), 0.0_wp, 0.0_wp], q0, no_rotation, &
+                          status_bad_momentum, .true., .true.))
+    end subroutine check_refused
+
+    !> Whether a call with this input is refused with this status and leaves it alone: the quaternion's or the
+    !> matrix's, and `alone` the momentum's.
+    function refused(body, h, m_in, q_in, a_in, status, alone, by_quaternion) result(right)
+        type(rigid_body), intent(in) :: body
+        real(wp), intent(in) :: h, m_in(3), q_in(4), a_in(3, 3)
+        integer, intent(in) :: status
+        logical, intent(in) :: alone, by_quaternion
+        logical :: right
+        real(wp) :: m(3), q(4), a(3, 3)
+        integer :: stat
+
+        right = .true.
+        if (alone) then
+            m = m_in
+            call free_flow(body, h, m, stat)
+            right = right .and. stat == status .and. same(m, m_in)
+        end if
+        if (by_quaternion) then
+            m = m_in
+            q = q_in
+            call free_flow(body, h, m, q, stat)
+            right = right .and. stat == status .and. same(m, m_in) .and. same(q, q_in)
+        end if
+        if (alone .or. .not. by_quaternion) then
+            m = m_in
+            a = a_in
+            call free_flow(body, h, m, a, stat)
+            right = right .and. stat == status .and. same(m, m_in) .and. same([a], [a_in])
+        end if
+    end function refused
+
+    !> Bad bodies, momenta and attitudes here and there among 100: they stay, the others go on as if alone.
+    subroutine check_refused_in_batches(t)
+        type(tally), intent(inout) :: t
+        integer, parameter :: n = 100
+        type(stream) :: random
+        type(rigid_body) :: bodies(n)
+        real(wp) :: m_in(3, n), q_in(4, n), m(3, n), q(4, n), one(7), h
+        logical :: bad(n), stays, goes_on
+        integer :: i, kind, stat, expected
+
+        do kind = 1, 6
+            do i = 1, n
+                bodies(i) = rigid_body(random%triangle())
+                if (kind >= 4) bodies(i) = rigid_body(moments)
+                m_in(:, i) = random%direction()
+                q_in(:, i) = q0
+                bad(i) = mod(i*i, 13) == 4
+                if (.not. bad(i)) cycle
+                select case (kind)
+                case (1)
+                    bodies(i) = rigid_body([1.0_wp, 0.0_wp, 1.0_wp])
+                    expected = status_bad_moments
+                case (2, 4)
+                    m_in(1 + mod(i, 3), i) = not_a_number(i)
+                    expected = status_bad_momentum
+                case (3, 5)
+                    q_in(1 + mod(i, 4), i) = not_a_number(i)
+                    expected = status_bad_attitude
+                case (6)
+                    q_in(:, i) = 0.0_wp
+                end select
+            end do
+            stays = .true.
+            goes_on = .true.
+            do i = -2, 2
+                h = 10.0_wp**i
+                m = m_in
+                q = q_in
+                if (kind <= 3) then
+                    call free_flow(bodies, h, m, q, stat)
+                else
+                    call free_flow(bodies(1), h, m, q, stat)
+                end if
+                stays = stays .and. stat == expected
+                call compare()
+            end do
+            call t%ok('bad-bodies-of-a-batch-stay-as-they-are: '//achar(48 + kind), stays)
+            call t%ok('good-bodies-of-a-batch-go-on: '//achar(48 + kind), goes_on)
+        end do
+        m = m_in
+        q = spread(q0, 2, n)
+        call free_flow(bodies, not_a_number(1), m, q, stat)
+        call t%ok('a-batch-refuses-a-time-that-is-not-finite', stat == status_bad_time &
+                  .and. same([m], [m_in]) .and. same([q], [spread(q0, 2, n)]))
+        call free_flow(rigid_body([1.0_wp, 1.0_wp, 0.0_wp]), 1.0_wp, m, stat)
+        call t%ok('a-batch-refuses-its-only-body', stat == status_bad_moments .and. same([m], [m_in]))
+
+    contains
+
+        subroutine compare()
+            integer :: j
+
+            do j = 1, n
+                if (bad(j)) then
+                    stays = stays .and. same(m(:, j), m_in(:, j)) .and. same(q(:, j), q_in(:, j))
+                else
+                    one = advanced(bodies(j)%moments, m_in(:, j), h, q_in(:, j))
+                    goes_on = goes_on .and. maxval(abs(settled([m(:, j), q(:, j)]) - one)) <= 16*eps
+                end if
+            end do
+        end subroutine compare
+
+    end subroutine check_refused_in_batches
+
+    !> Arrays that do not match.
+    subroutine check_counts(t)
+        type(tally), intent(inout) :: t
+        type(rigid_body) :: body, bodies(4)
+        real(wp) :: m(3, 5), q(4, 5), m_kept(3, 5), q_kept(4, 5), m4(4, 5), q3(3, 5)
+        integer :: stat(7)
+
+        body = rigid_body(moments)
+        bodies = body
+        m = spread(m0, 2, 5)
+        q = spread(q0, 2, 5)
+        m_kept = m
+        q_kept = q
+        m4 = 1.0_wp
+        q3 = 1.0_wp
+        call free_flow(bodies, 1.0_wp, m, stat(1))
+        call free_flow(bodies, 1.0_wp, m, q, stat(2))
+        call free_flow(body, 1.0_wp, m4, stat(3))
+        call free_flow(body, 1.0_wp, m4, q, stat(4))
+        call free_flow(body, 1.0_wp, m, q3, stat(5))
+        call free_flow(body, 1.0_wp, m(:, :4), q, stat(6))
+        call free_flow(bodies, 1.0_wp, m(:, :4), q, stat(7))
+        call t%ok('arrays-that-do-not-match-are-refused', all(stat == status_bad_count))
+        call t%ok('arrays-that-do-not-match-are-left-alone', same([m, q], [m_kept, q_kept]))
+    end subroutine check_counts
+
+    !> 1000 bodies, short and long steps, extreme numbers, tensors, bad ones, symmetric ones mixed: the same
+    !> bits in one call and in any split, for equal and different bodies, with and without attitude.
+    subroutine check_splits(t)
+        type(tally), intent(inout) :: t
+        integer, parameter :: n = 1000
+        integer, parameter :: splits(6) = [1, 7, 24, 32, 37, 500]
+        type(stream) :: random
+        type(rigid_body), allocatable :: bodies(:)
+        real(wp), allocatable :: m_in(:, :), q_in(:, :), m1(:, :), q1(:, :), m2(:, :), q2(:, :), m3(:, :)
+        real(wp) :: tensor(3, 3), r(3, 3), size_m, q(4)
+        logical :: different, equal, alone
+        integer :: i, j, k, first, last, stat
+
+        allocate (bodies(n), m_in(3, n), q_in(4, n), m1(3, n), q1(4, n), m2(3, n), q2(4, n), m3(3, n))
+        do i = 1, n
+            bodies(i) = rigid_body(random%triangle())
+            size_m = 1.0_wp
+            select case (mod(i, 11))
+            case (1, 2)
+                size_m = random%log_uniform(-6.0_wp, 6.0_wp)
+            case (3)
+                size_m = random%log_uniform(-300.0_wp, 300.0_wp)
+            case (4)
+                q = [random%uniform(-1.0_wp, 1.0_wp), random%direction()]
+                r = quat_to_matrix(q/norm2(q))
+                tensor = matmul(r, transpose(spread(bodies(i)%moments, 1, 3)*r))
+                bodies(i) = rigid_body(0.5_wp*(tensor + transpose(tensor)))
+            case (5)
+                bodies(i) = rigid_body(random%log_uniform(-3.0_wp, 3.0_wp)*[1.0_wp, 1.0_wp, 0.5_wp])
+            case default
+            end select
+            m_in(:, i) = size_m*random%direction()
+            if (mod(i, 50) == 7) m_in(2, i) = not_a_number(i)
+            if (mod(i, 50) == 8) m_in(:, i) = 0.0_wp
+            q_in(:, i) = q0
+            if (mod(i, 50) == 9) q_in(:, i) = 0.0_wp
+        end do
+        different = .true.
+        equal = .true.
+        alone = .true.
+        do k = -4, 3
+            m1 = m_in
+            q1 = q_in
+            call free_flow(bodies, 3*10.0_wp**k, m1, q1, stat)
+            m3 = m_in
+            call free_flow(bodies, 3*10.0_wp**k, m3, stat)
+            do i = 1, n
+                if (mod(i, 50) /= 9) alone = alone .and. same(m3(:, i), m1(:, i))
+            end do
+            do j = 1, size(splits)
+                m2 = m_in
+                q2 = q_in
+                do first = 1, n, splits(j)
+                    last = min(first + splits(j) - 1, n)
+                    call free_flow(bodies(first:last), 3*10.0_wp**k, m2(:, first:last), q2(:, first:last), &
+                                   stat)
+                end do
+                different = different .and. same([m2], [m1]) .and. same([q2], [q1])
+            end do
+            m1 = m_in
+            q1 = q_in
+            call free_flow(bodies(1), 3*10.0_wp**k, m1, q1, stat)
+            m3 = m_in
+            call free_flow(bodies(1), 3*10.0_wp**k, m3, stat)
+            do i = 1, n
+                if (mod(i, 50) /= 9) alone = alone .and. same(m3(:, i), m1(:, i))
+            end do
+            do j = 1, size(splits)
+                m2 = m_in
+                q2 = q_in
+                do first = 1, n, splits(j)
+                    last = min(first + splits(j) - 1, n)
+                    call free_flow(bodies(1), 3*10.0_wp**k, m2(:, first:last), q2(:, first:last), stat)
+                end do
+                equal = equal .and. same([m2], [m1]) .and. same([q2], [q1])
+            end do
+        end do
+        call t%ok('different-bodies-give-the-same-bits-however-split', different)
+        call t%ok('equal-bodies-give-the-same-bits-however-split', equal)
+        call t%ok('momenta-alone-give-the-same-bits', alone)
+    end subroutine check_splits
+
+    !> Any body, momentum and step: moments over 12 decades, symmetric and nearly so; momenta next to axes and
+    !> to the separatrix; steps over 20 decades. FRB_SEED in the environment asks for other cases.
+    subroutine check_fuzz(t)
+        type(tally), intent(inout) :: t
+        integer, parameter :: cases = 4000
+        integer, parameter :: width = 40
+        type(stream) :: random
+        character(20) :: seed
+        real(wp) :: moments(3), m(3), h, there(7), back(7), orbit(4), error, batch, sensitive, unit, one(7)
+        real(wp) :: many_m(3, width), many_q(4, width), many_moments(3, width), many_m0(3, width)
+        type(rigid_body) :: bodies(width)
+        logical :: finite
+        integer :: i, j, io, length
+
+        random%state = 20081
+        call get_environment_variable('FRB_SEED', seed, length, io)
+        if (io == 0 .and. length > 0) read (seed, *, iostat=io) random%state
+        random%state = 1 + modulo(random%state, 2147483646_int64)
+        write (output_unit, '(a,i0)') '  fuzz with seed ', random%state - 1
+        orbit = 0.0_wp
+        error = 0.0_wp
+        batch = 0.0_wp
+        sensitive = 0.0_wp
+        finite = .true.
+        do i = 1, cases
+            call draw(random, moments, m)
+            h = sign(random%log_uniform(-15.0_wp, 5.0_wp), random%uniform(-1.0_wp, 1.0_wp)) &
+                *(minval(moments)/norm3(m))
+            there = advanced(moments, m, h)
+            finite = finite .and. there(1) < 1.0e30_wp
+            back = advanced(moments, there(1:3), -h, there(4:7))
+            unit = sensitivity(moments, m, h) + sensitivity(moments, there(1:3), -h)
+            if (unit < most_sensitive) then
+                orbit = max(orbit, bounded(defect(moments, m, there), moments, m))
+            else
+                sensitive = max(sensitive, maxval(bounded(defect(moments, m, there), moments, m)))
+            end if
+            if (unit < most_sensitive) error = max(error, norm3(back(1:3) - m)/norm3(m)/unit, &
+                                                   norm2(back(4:7) - no_turn)/unit)
+        end do
+        do i = 1, cases/width/4
+            h = random%log_uniform(-8.0_wp, 5.0_wp)
+            do j = 1, width
+                call draw(random, many_moments(:, j), many_m0(:, j))
+                bodies(j) = rigid_body(many_moments(:, j))
+            end do
+            many_m = many_m0
+            many_q = spread(no_turn, 2, width)
+            call free_flow(bodies, h, many_m, many_q)
+            do j = 1, width
+                there = settled([many_m(:, j), many_q(:, j)])
+                one = advanced(many_moments(:, j), many_m0(:, j), h)
+                sensitive = max(sensitive, maxval(bounded(defect(many_moments(:, j), many_m0(:, j), there), &
+                                                          many_moments(:, j), many_m0(:, j))))
+                unit = sensitivity(many_moments(:, j), many_m0(:, j), h)
+                if (unit < most_sensitive) batch = max(batch, norm2(there(4:7) - one(4:7))/unit, &
+                                                       norm3(there(1:3) - one(1:3))/norm3(one(1:3))/unit)
+            end do
+        end do
+        call t%ok('fuzz-stays-finite', finite)
+        call t%at_most('fuzz-keeps-q-unit', orbit(1), on_the_orbit)
+        call t%at_most('fuzz-keeps-the-norm-of-m', orbit(2), on_the_orbit)
+        call t%at_most('fuzz-keeps-the-energy', orbit(3), on_the_orbit)
+        call t%at_most('fuzz-keeps-the-momentum-in-space', orbit(4), on_the_orbit)
+        call t%at_most('fuzz-next-to-the-separatrix-stays-close-to-the-orbit', sensitive, next_to_separatrix)
+        call t%at_most('fuzz-there-and-back', error, returned)
+        call t%at_most('fuzz-batches-agree-with-one-by-one', batch, same_in_batch)
+    end subroutine check_fuzz
+
+    !> The next body and momentum.
+    subroutine draw(random, moments, m)
+        type(stream), intent(inout) :: random
+        real(wp), intent(out) :: moments(3), m(3)
+        integer :: i, j, k, axis
+
+        i = int(random%uniform(0.0_wp, 6.0_wp))
+        j = 1 + int(random%uniform(0.0_wp, 3.0_wp))
+        k = 1 + mod(j, 3)
+        moments = random%triangle()
+        if (mod(i, 2) == 0) then
+            do axis = 1, 3
+                moments(axis) = random%log_uniform(-6.0_wp, 6.0_wp)
+            end do
+        end if
+        if (i == 2) moments(j) = moments(k)
+        if (i == 3) moments(j) = moments(k)*(1 + random%log_uniform(-16.0_wp, -3.0_wp))
+        if (i == 4) moments = moments(j)
+        m = random%direction()
+        if (i == 1) m = near_separatrix(random, moments, random%log_uniform(-16.0_wp, 0.0_wp))
+        if (i == 5) then
+            m = m*random%log_uniform(-20.0_wp, -1.0_wp)
+            m(k) = 1.0_wp
+        end if
+        m = m*random%log_uniform(-10.0_wp, 10.0_wp)
+    end subroutine draw
+
+    !> The defects with that of the energy relative to the largest energy of |m|: |m|^2/(2 I1).
+    pure function bounded(defects, moments, m) result(scaled)
+        real(wp), intent(in) :: defects(4), moments(3), m(3)
+        real(wp) :: scaled(4)
+
+        scaled = defects
+        scaled(3) = defects(3)*sum((m/norm3(m))**2*(minval(moments)/moments))
+    end function bounded
+
+    !> How far m/|m| and q may move when momentum and moments move by 2^-53, there and back: the angle turned,
+    !> and the growth of deviations along the orbit, from the motions 1e-7 beside. No more than 1e-9 is known.
+    function sensitivity(moments, m, h) result(unit)
+        real(wp), intent(in) :: moments(3), m(3), h
+        real(wp) :: unit
+        real(wp), parameter :: beside = 1.0e-7_wp
+        real(wp) :: one(7), other(7), moved_m(3), moved(3)
+        integer :: i, axis
+
+        one = advanced(moments, m, h)
+        unit = 2 + abs(h)*norm3(m)/minval(moments)
+        do i = 1, 6
+            axis = 1 + mod(i, 3)
+            moved_m = m
+            moved = moments
+            if (i <= 3) then
+                moved_m(axis) = moved_m(axis) + beside*norm3(m)
+            else
+                moved(axis) = moved(axis)*(1 + beside)
+            end if
+            other = advanced(moved, moved_m, h)
+            unit = max(unit, norm3(other(1:3) - one(1:3))/(beside*norm3(m)), &
+                       norm2(other(4:7) - one(4:7))/beside)
+        end do
+        unit = 2*unit*unit_roundoff
+    end function sensitivity
+
+end module frb_test_flow_batches
