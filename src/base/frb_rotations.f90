@@ -9,7 +9,8 @@ module frb_rotations
     implicit none
     private
 
-    public :: cross, norm3, quat_product, quat_conjugate, quat_rotate, quat_to_matrix, matrix_to_quat
+    public :: cross, norm3, quat_product, quat_conjugate, quat_rotate, quat_to_matrix, matrix_to_quat, &
+        quat_along
 
 contains
 
@@ -37,15 +38,17 @@ contains
         end if
     end function norm3
 
-    !> Hamilton product p q.
+    !> Hamilton product p q. The vector part of q times its conjugate is exactly zero, in fused arithmetic too:
+    !> parentheses keep a compiler from contracting a product into a sum, which would round the two halves of a
+    !> difference differently.
     pure function quat_product(p, q) result(pq)
         real(wp), intent(in) :: p(4), q(4)
         real(wp) :: pq(4)
 
-        pq(1) = p(1)*q(1) - p(2)*q(2) - p(3)*q(3) - p(4)*q(4)
-        pq(2) = p(1)*q(2) + q(1)*p(2) + p(3)*q(4) - p(4)*q(3)
-        pq(3) = p(1)*q(3) + q(1)*p(3) + p(4)*q(2) - p(2)*q(4)
-        pq(4) = p(1)*q(4) + q(1)*p(4) + p(2)*q(3) - p(3)*q(2)
+        pq(1) = (p(1)*q(1)) - (p(2)*q(2)) - (p(3)*q(3)) - (p(4)*q(4))
+        pq(2) = (p(1)*q(2)) + (q(1)*p(2)) + (p(3)*q(4)) - (p(4)*q(3))
+        pq(3) = (p(1)*q(3)) + (q(1)*p(3)) + (p(4)*q(2)) - (p(2)*q(4))
+        pq(4) = (p(1)*q(4)) + (q(1)*p(4)) + (p(2)*q(3)) - (p(3)*q(2))
     end function quat_product
 
     !> Conjugate of q; for a unit quaternion its inverse.
@@ -83,34 +86,38 @@ contains
     end function quat_to_matrix
 
     !> Unit quaternion of a rotation matrix, up to sign; the scalar part comes back non-negative.
-    !> The largest component is formed first, so no digits are lost at any attitude.
     pure function matrix_to_quat(matrix) result(q)
         real(wp), intent(in) :: matrix(3, 3)
         real(wp) :: q(4)
-        real(wp) :: squares(4)
-        integer :: largest
 
-        squares = 1 + [matrix(1, 1) + matrix(2, 2) + matrix(3, 3), &
-                       matrix(1, 1) - matrix(2, 2) - matrix(3, 3), &
-                       matrix(2, 2) - matrix(3, 3) - matrix(1, 1), &
-                       matrix(3, 3) - matrix(1, 1) - matrix(2, 2)]
-        largest = maxloc(squares, dim=1)
-        select case (largest)
-        case (1)
-            q = [squares(1), matrix(3, 2) - matrix(2, 3), matrix(1, 3) - matrix(3, 1), &
-                 matrix(2, 1) - matrix(1, 2)]
-        case (2)
-            q = [matrix(3, 2) - matrix(2, 3), squares(2), matrix(1, 2) + matrix(2, 1), &
-                 matrix(1, 3) + matrix(3, 1)]
-        case (3)
-            q = [matrix(1, 3) - matrix(3, 1), matrix(1, 2) + matrix(2, 1), squares(3), &
-                 matrix(2, 3) + matrix(3, 2)]
-        case default
-            q = [matrix(2, 1) - matrix(1, 2), matrix(1, 3) + matrix(3, 1), matrix(2, 3) + matrix(3, 2), &
-                 squares(4)]
-        end select
+        q = quat_along(matrix)
         q = q/sqrt(sum(q**2))
         if (q(1) < 0.0_wp) q = -q
     end function matrix_to_quat
+
+    !> A quaternion of any sign, and of a norm from 1 to 4, of a rotation matrix. Its largest component is formed
+    !> as a sum, or one nearly as large, so no digits are lost at any attitude.
+    pure function quat_along(matrix) result(q)
+        real(wp), intent(in) :: matrix(3, 3)
+        real(wp) :: q(4)
+        real(wp) :: trace
+
+        trace = matrix(1, 1) + matrix(2, 2) + matrix(3, 3)
+        if (trace >= 0.0_wp) then
+            q(1) = 1 + trace
+            q(2) = matrix(3, 2) - matrix(2, 3)
+            q(3) = matrix(1, 3) - matrix(3, 1)
+            q(4) = matrix(2, 1) - matrix(1, 2)
+        else if (matrix(1, 1) >= max(matrix(2, 2), matrix(3, 3))) then
+            q = [matrix(3, 2) - matrix(2, 3), 1 + matrix(1, 1) - matrix(2, 2) - matrix(3, 3), &
+                 matrix(1, 2) + matrix(2, 1), matrix(1, 3) + matrix(3, 1)]
+        else if (matrix(2, 2) >= matrix(3, 3)) then
+            q = [matrix(1, 3) - matrix(3, 1), matrix(1, 2) + matrix(2, 1), &
+                 1 + matrix(2, 2) - matrix(3, 3) - matrix(1, 1), matrix(2, 3) + matrix(3, 2)]
+        else
+            q = [matrix(2, 1) - matrix(1, 2), matrix(1, 3) + matrix(3, 1), matrix(2, 3) + matrix(3, 2), &
+                 1 + matrix(3, 3) - matrix(1, 1) - matrix(2, 2)]
+        end if
+    end function quat_along
 
 end module frb_rotations

@@ -22,7 +22,7 @@ module frb_paper_motion
     implicit none
     private
 
-    public :: paper_motion, normal_form, simple_motion, add_momentum
+    public :: paper_motion, normal_form, simple_motion, add_momentum, turn_from_one
     public :: motion_at_rest, motion_sphere, motion_axis, motion_equal_12, motion_equal_23, motion_elliptic
 
     integer, parameter :: motion_at_rest = 0    !! m = 0
@@ -38,7 +38,8 @@ module frb_paper_motion
     !> 1 - k**2 below this counts as the separatrix, for the same reason.
     real(wp), parameter :: on_separatrix = 1.0e-270_wp
 
-    !> a2 - a3 below this counts as I2 = I3: both are larger than I1 by a factor of 1e74 and more.
+    !> alpha below this counts as I2 = I3, so that nothing underflows. Both are then far larger than I1: by 1e90,
+    !> or where they agree to their last digit, I3 - I2 > 1.1e-16 I3 yet, by 1e74.
     real(wp), parameter :: smallest_alpha = 1.0e-90_wp
 
     !> One step in the paper's form; made by `normal_form`.
@@ -218,6 +219,29 @@ contains
             end do
         end if
     end function add_momentum
+
+    !> The turn of a body as a change of its attitude, in the caller's axes: `turn` is sense (1 + change) but for
+    !> its norm. The norm of 1 + change is one to the rounding of change, so that an attitude which is advanced
+    !> as old value plus change keeps its norm: a turn which is short or long by a part of a rounding, in the same
+    !> way in every step of a chain, would let it grow.
+    pure subroutine turn_from_one(motion, turn, change, sense)
+        type(paper_motion), intent(in) :: motion
+        real(wp), intent(in) :: turn(4)         !! a quaternion of norm one to rounding, sorted axes
+        real(wp), intent(out) :: change(4)
+        real(wp), intent(out) :: sense          !! -1 or +1, the sign of the scalar part
+        real(wp) :: length2, v(3)
+
+        length2 = turn(2)*turn(2) + turn(3)*turn(3) + turn(4)*turn(4)
+        sense = sign(1.0_wp, turn(1))
+        ! one over the norm by its tangent
+        v = turn(2:4)*(sense*(1 - 0.5_wp*((turn(1)*turn(1) - 1) + length2)))
+        change(1) = -(v(1)*v(1) + v(2)*v(2) + v(3)*v(3))/(1 + abs(turn(1)))
+        if (motion%sorted) then
+            change(2:4) = v
+        else
+            change(1 + motion%order) = motion%parity*v
+        end if
+    end subroutine turn_from_one
 
     !> Quaternion of a turn by an angle about a unit vector.
     pure function turn_about(axis, angle) result(q)

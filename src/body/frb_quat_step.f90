@@ -4,7 +4,8 @@ module frb_quat_step
     use frb_matrix_step, only: most_points, largest_attitude
     use frb_paper_angle, only: exact_angle, quadrature_angle, angle_by_middle_axis, angle_by_outer_axes
     use frb_paper_momentum, only: momentum_step, momentum_by_addition, momentum_by_phase
-    use frb_paper_motion, only: paper_motion, normal_form, simple_motion, add_momentum, motion_elliptic
+    use frb_paper_motion, only: paper_motion, normal_form, simple_motion, add_momentum, turn_from_one, &
+        motion_elliptic
     use frb_rotations, only: quat_product, quat_conjugate
     use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_count, status_bad_option
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
@@ -33,8 +34,9 @@ contains
     !> turn from qin to qout then has a scalar part >= 0.
     !>
     !> Accuracy of the exact step, in units of the inherent sensitivity (data/reference): in every group a
-    !> median below 2 and a maximum below 4 for m and for q in frame 1, below 6 in frames 2 and 3; the turn
-    !> from qin to qout is unit to 1e-14 (checked by steps). The sensitivity itself grows near the middle axis
+    !> median below 1 and a maximum below 3, for m and for q in each frame; the turn from qin to qout is unit to
+    !> 1e-14 (checked by steps). In a chain of 20 000 steps |m|, the energy, q m q* and |q| stay to 1e-13 (checked
+    !> by step-laws); rounding adds up like a random walk, as the square root of the number of steps. The sensitivity itself grows near the middle axis
     !> and the separatrix: once h covers a half turn, m and q lose about log10(1/(1 - k**2)) of 16 digits.
     !> The frames have poles, where p turns fast: m along -e3 for (1), along any principal axis for (2), along
     !> +-e3 for (3). Exact steps lose nothing there; semi-exact ones about log10(1/distance) digits, and their
@@ -57,7 +59,7 @@ contains
         integer, intent(in), optional :: frame         !! 1 (default), 2 or 3
         integer, intent(out), optional :: stat         !! status_ok, or what is wrong
         type(paper_motion) :: motion
-        real(wp) :: start_m(3), start_q(4), change(3), turn(4)
+        real(wp) :: start_m(3), start_q(4), change(3), turn(4), turn_change(4), sense
         integer :: code, points, chosen
 
         start_m = Piin
@@ -86,9 +88,9 @@ contains
             end if
         end if
         if (code == status_ok) then
-            if (.not. motion%sorted) turn(1 + motion%order) = motion%parity*turn(2:4)
             Piout = add_momentum(motion, start_m, change)
-            qout = quat_product(start_q, turn)
+            call turn_from_one(motion, turn, turn_change, sense)
+            qout = sense*(start_q + quat_product(start_q, turn_change))
         else
             Piout = start_m
             qout = start_q
