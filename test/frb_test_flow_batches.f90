@@ -89,35 +89,35 @@ contains
             .and. bad(2)%status == status_bad_tensor .and. all(good%status == status_ok)
         do i = 1, 3
             if (.not. refused(bad(i), 1.0_wp, m0, q0, no_rotation, bad(i)%status, &
-                                              .true., .true.)) right(2) = .false.
+                              .true., .true.)) right(2) = .false.
         end do
         zero = 0.0_wp
         zero(3) = -zero(3)
         do k = 1, 2
             do i = 1, 3
                 if (.not. refused(good(k), not_a_number(i), m0, q0, no_rotation, &
-                                                  status_bad_time, .true., .true.)) right(3) = .false.
+                                  status_bad_time, .true., .true.)) right(3) = .false.
                 do j = 1, 3
                     bad_m = m0
                     bad_m(j) = not_a_number(i)
                     if (.not. refused(good(k), 1.0_wp, bad_m, q0, no_rotation, &
-                                                      status_bad_momentum, .true., .true.)) right(4) = .false.
+                                      status_bad_momentum, .true., .true.)) right(4) = .false.
                 end do
                 do j = 1, 4
                     bad_q = q0
                     bad_q(j) = not_a_number(i)
                     if (.not. refused(good(k), 1.0_wp, m0, bad_q, no_rotation, &
-                                                      status_bad_attitude, .false., .true.)) right(5) = .false.
+                                      status_bad_attitude, .false., .true.)) right(5) = .false.
                 end do
                 do j = 1, 9
                     bad_a = no_rotation
                     bad_a(1 + mod(j, 3), 1 + mod((j - mod(j, 3))/3, 3)) = not_a_number(i)
                     if (.not. refused(good(k), 1.0_wp, m0, q0, bad_a, status_bad_attitude, &
-                                                      .false., .false.)) right(6) = .false.
+                                      .false., .false.)) right(6) = .false.
                 end do
             end do
             if (.not. refused(good(k), 1.0_wp, m0, zero, no_rotation, status_bad_attitude, &
-                                              .false., .true.)) right(7) = .false.
+                              .false., .true.)) right(7) = .false.
         end do
         call t%ok('bodies-that-could-not-be-made-say-why', right(1))
         call t%ok('such-bodies-are-refused-with-their-status', right(2))
@@ -177,6 +177,7 @@ contains
         integer :: i, kind, stat, expected
 
         do kind = 1, 6
+            expected = status_bad_attitude
             do i = 1, n
                 bodies(i) = rigid_body(random%triangle())
                 if (kind >= 4) bodies(i) = rigid_body(moments)
@@ -193,8 +194,7 @@ contains
                     expected = status_bad_momentum
                 case (3, 5)
                     q_in(1 + mod(i, 4), i) = not_a_number(i)
-                    expected = status_bad_attitude
-                case (6)
+                case default
                     q_in(:, i) = 0.0_wp
                 end select
             end do
