@@ -49,8 +49,8 @@ contains
         made = self%passed + self%failed - self%at_opening
         if (made /= self%announced) then
             self%failed = self%failed + 1
-            write (output_unit, '(a,i0,a,i0)') '  FAILED '//self%suite//': made ', made, ' checks, announced ', &
-                self%announced
+            write (output_unit, '(a,i0,a,i0)') '  FAILED '//self%suite//': made ', made, &
+                ' checks, announced ', self%announced
         end if
         flush (output_unit)
     end subroutine close_suite

@@ -60,7 +60,8 @@ contains
         real(wp), intent(in) :: q(4)
         real(wp) :: score
 
-        score = real(2*sqrt(min(sum((q - item%q)**2), sum((q + item%q)**2)))/(2*unit_roundoff + item%sens_q), wp)
+        score = real(2*sqrt(min(sum((q - item%q)**2), sum((q + item%q)**2))) &
+                     /(2*unit_roundoff + item%sens_q), wp)
     end function score_attitude
 
     !> Median of the values (the upper of the two middle ones for an even count); NaN sorts as the largest.

@@ -146,8 +146,9 @@ contains
                                    /(1 + abs(u) + abs(steps(j))))
                     error_phi0 = max(error_phi0, abs(phi0 - starts(i)))
                     call landen_step(sn, cn, -steps(j), 0.0_wp, sb, cb, db, phi_a, phi_b, complements(l))
-                    if (complements(l) > 1.0e-6_wp) &
+                    if (complements(l) > 1.0e-6_wp) then
                         error_back = max(error_back, maxval(abs([sb - s0, cb - c0]))/(1 + abs(steps(j))))
+                    end if
                 end do
             end do
         end do

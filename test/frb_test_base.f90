@@ -50,7 +50,8 @@ contains
                                                        [0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp]), &
                         [0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], 0.0_wp)
         call t%close_to('cross-product-of-first-two-axes-is-the-third', &
-                        cross([1.0_wp, 0.0_wp, 0.0_wp], [0.0_wp, 1.0_wp, 0.0_wp]), [0.0_wp, 0.0_wp, 1.0_wp], 0.0_wp)
+                        cross([1.0_wp, 0.0_wp, 0.0_wp], [0.0_wp, 1.0_wp, 0.0_wp]), &
+                        [0.0_wp, 0.0_wp, 1.0_wp], 0.0_wp)
         call t%close_to('norm-survives-huge-vectors', norm3([3.0e200_wp, 4.0e200_wp, 0.0_wp])/5.0e200_wp, &
                         1.0_wp, 2*eps)
         call t%close_to('norm-survives-tiny-vectors', norm3([3.0e-200_wp, 4.0e-200_wp, 0.0_wp])/5.0e-200_wp, &

@@ -51,11 +51,13 @@ contains
                           'of-huge-momentum')
 
         motion = free_motion(rigid_body([2.0_wp, 2.0_wp, 3.0_wp]), [0.3_wp, 0.4_wp, 1.2_wp], unit)
-        call t%close_to('period-of-a-symmetric-body', motion%period(), two_pi/(1.2_wp/6), 8*eps*motion%period())
-        call t%close_to('symmetric-body-precesses-at-the-rate-of-its-transverse-moment', motion%precession(), &
-                        1.3_wp/2*motion%period(), 8*eps*motion%precession())
+        call t%close_to('period-of-a-symmetric-body', motion%period(), two_pi/(1.2_wp/6), &
+                        8*eps*motion%period())
+        call t%close_to('symmetric-body-precesses-at-the-rate-of-its-transverse-moment', &
+                        motion%precession(), 1.3_wp/2*motion%period(), 8*eps*motion%precession())
         motion = free_motion(rigid_body([2.0_wp, 3.0_wp, 6.0_wp]), [0.4_wp, 0.8_wp, 0.4_wp], unit)
-        call t%ok('no-period-on-the-separatrix', .not. motion%periodic .and. .not. ieee_is_finite(motion%period()))
+        call t%ok('no-period-on-the-separatrix', &
+                  .not. motion%periodic .and. .not. ieee_is_finite(motion%period()))
         motion = free_motion(rigid_body([2.0_wp, 3.0_wp, 6.0_wp]), [0.0_wp, 0.8_wp, 0.0_wp], unit)
         call t%ok('no-period-on-the-middle-axis', .not. motion%periodic)
         motion = free_motion(rigid_body([2.0_wp, 2.0_wp, 2.0_wp]), [0.1_wp, 0.8_wp, 0.0_wp], unit)

@@ -16,7 +16,7 @@ module frb_test_steps
 
     real(wp), parameter :: eps = epsilon(1.0_wp)
 
-    !> Median and maximum of the scores in every group, of the momentum, the matrix, the quaternion in each frame.
+    !> Median and maximum of the scores in every group, of momentum, matrix, quaternion in each frame.
     real(wp), parameter :: units(2) = [1.0_wp, 3.0_wp]
     real(wp), parameter :: orthogonal_to = 1.0e-14_wp
 

@@ -158,6 +158,7 @@ contains
             moments(2) = 1 - distance*x(2)
         case (8)
             m = [0.0_wp, distance*sign_of, -1.0_wp]
+        case default        ! 9: short steps, see below
         end select
         item = new_case(moments, m, merge(distance*(0.5_wp + x(4)), (2 + 8*x(4))/norm2(m/moments), &
             panel == 9))

@@ -89,6 +89,8 @@ program frb_charts
             call chart_orbits(options)
             call chart_racket(options)
             call chart_torus(options)
+        case default
+            error stop 'a chart is named that is not drawn'
         end select
     end do
 

@@ -8,6 +8,7 @@ module frb_lapack
     interface
         !> Eigenvalues (ascending) and eigenvectors of a real symmetric matrix.
         pure subroutine dsyev(jobz, uplo, n, a, lda, w, work, lwork, info)
+            implicit none
             integer, parameter :: dp = kind(1.0d0)
             character, intent(in) :: jobz, uplo
             integer, intent(in) :: n, lda, lwork
@@ -18,6 +19,7 @@ module frb_lapack
 
         !> Eigenvalues (ascending) and eigenvectors of a real symmetric tridiagonal matrix.
         pure subroutine dstev(jobz, n, d, e, z, ldz, work, info)
+            implicit none
             integer, parameter :: dp = kind(1.0d0)
             character, intent(in) :: jobz
             integer, intent(in) :: n, ldz

@@ -38,9 +38,9 @@ contains
         end if
     end function norm3
 
-    !> Hamilton product p q. The vector part of q times its conjugate is exactly zero, in fused arithmetic too:
-    !> parentheses keep a compiler from contracting a product into a sum, which would round the two halves of a
-    !> difference differently.
+    !> Hamilton product p q. The vector part of q times its conjugate is exactly zero, in fused arithmetic
+    !> too: parentheses keep a compiler from contracting a product into a sum, which would round the two
+    !> halves of a difference differently.
     pure function quat_product(p, q) result(pq)
         real(wp), intent(in) :: p(4), q(4)
         real(wp) :: pq(4)
@@ -95,8 +95,8 @@ contains
         if (q(1) < 0.0_wp) q = -q
     end function matrix_to_quat
 
-    !> A quaternion of any sign, and of a norm from 1 to 4, of a rotation matrix. Its largest component is formed
-    !> as a sum, or one nearly as large, so no digits are lost at any attitude.
+    !> A quaternion of any sign, and of a norm from 1 to 4, of a rotation matrix. Its largest component is
+    !> formed as a sum, or one nearly as large, so no digits are lost at any attitude.
     pure function quat_along(matrix) result(q)
         real(wp), intent(in) :: matrix(3, 3)
         real(wp) :: q(4)

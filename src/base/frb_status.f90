@@ -20,7 +20,7 @@ module frb_status
     integer, parameter :: status_bad_momentum = 3   !! angular momentum is not finite
     integer, parameter :: status_bad_attitude = 4   !! attitude is not finite, or a quaternion of norm zero
     integer, parameter :: status_bad_time = 5       !! time or step is not finite, or zero where it may not be
-    integer, parameter :: status_bad_count = 6      !! a number of bodies, points, steps or array sizes is wrong
+    integer, parameter :: status_bad_count = 6      !! a number of bodies, points, steps or a size is wrong
     integer, parameter :: status_bad_option = 7     !! an option has none of its values
     integer, parameter :: status_bad_torque = 8     !! a torque or potential returned NaN or Inf
     integer, parameter :: status_bad_scheme = 9     !! coefficients do not sum to one, or are not symmetric

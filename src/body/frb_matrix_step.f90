@@ -34,8 +34,8 @@ contains
     !>
     !> Accuracy of the exact step, in units of the inherent sensitivity (data/reference): median below 1 and
     !> maximum below 3 in every group, for m and Q; Q orthogonal to 1e-14 (checked by steps). In a chain of
-    !> 20 000 steps |m|, the energy, Q m and Q^T Q stay to 1e-13 (checked by step-laws); rounding adds up like a
-    !> random walk, as the square root of the number of steps.
+    !> 20 000 steps |m|, the energy, Q m and Q^T Q stay to 1e-13 (checked by step-laws); rounding adds up like
+    !> a random walk, as the square root of the number of steps.
     !> The sensitivity itself grows near the middle axis and the separatrix: once h covers a half turn, m and
     !> Q lose about log10(1/(1 - k**2)) of 16 digits, all of them for 1 - k**2 below 1e-16, where m stays
     !> on the orbit, Q orthogonal and Q m constant. With np >= 1 Q also loses digits, and needs a smaller h,
@@ -90,9 +90,9 @@ contains
         call conclude(code, 'frb_step', stat)
     end subroutine frb_step
 
-    !> Qin E(q/|q|) as Qin + Qin (E(q/|q|) - 1), with E - 1 = 2 (q0 hat(q) + hat(q)**2)/|q|**2, (10), which is a
-    !> rotation whatever the norm of q. The change of a small step is small, and so is what rounding adds to the
-    !> lengths of the columns and to the angles between them: in a chain of steps it does not pile up.
+    !> Qin E(q/|q|) as Qin + Qin (E(q/|q|) - 1), with E - 1 = 2 (q0 hat(q) + hat(q)**2)/|q|**2, (10), which is
+    !> a rotation whatever the norm of q. The change of a small step is small, and so is what rounding adds to
+    !> the lengths of the columns and to the angles between them: in a chain of steps it does not pile up.
     pure function turned_attitude(motion, q_in, turn) result(q_out)
         type(paper_motion), intent(in) :: motion
         real(wp), intent(in) :: q_in(3, 3)
@@ -118,8 +118,8 @@ contains
         end associate
     end function turned_attitude
 
-    !> Lines (5) to (18) of Algorithm 1: the rotation P(0)^T Y(psi) P(h), P = [v, w, m]^T with v along m', (6),
-    !> in sorted axes; as a quaternion, because rounding leaves the nine numbers a little off a rotation.
+    !> Lines (5) to (18) of Algorithm 1: the rotation P(0)^T Y(psi) P(h), P = [v, w, m]^T with v along m',
+    !> (6), in sorted axes; as a quaternion, because rounding leaves the nine numbers a little off a rotation.
     subroutine elliptic_turn(motion, points, change, turn, code)
         type(paper_motion), intent(in) :: motion
         integer, intent(in) :: points

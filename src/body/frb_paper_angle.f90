@@ -50,9 +50,10 @@ contains
                 ! n delta: n = alpha/p in case (i), gamma/r in case (ii), and 1 - n = abs(delta)/p or /r
                 n_delta = merge(-alpha, gamma, motion%first_case)*motion%nc
                 angle = motion%a2*motion%time
-                if (motion%nc > 0.0_wp) &
+                if (motion%nc > 0.0_wp) then
                     angle = angle + third_kind(2*n_delta/motion%lambda, motion, step, &
                                                step%cn**2 + motion%nc*step%sn**2, motion%nc)
+                end if
                 z(1) = c*d
                 z(2) = gamma*m(1)*s*d
                 z(3) = 0.0_wp

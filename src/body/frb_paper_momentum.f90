@@ -57,8 +57,9 @@ contains
                 u = sign(long_on_separatrix, u)
             end if
             call jacobi(u, 0.0_wp, step%sn, step%cn, step%dn, motion%kc2)
-            if (abs(u) > half_pi .and. motion%kc2 > 0.0_wp) &
+            if (abs(u) > half_pi .and. motion%kc2 > 0.0_wp) then
                 step%half_turns = anint(0.5_wp*u/ellip_k(0.0_wp, motion%kc2))
+            end if
             s = step%sn/motion%lambda
             ! D = 1 - alpha gamma m2**2 s**2 as a sum of squares that keeps its digits near the separatrix
             if (motion%first_case) then

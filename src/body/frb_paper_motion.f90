@@ -38,8 +38,8 @@ module frb_paper_motion
     !> 1 - k**2 below this counts as the separatrix, for the same reason.
     real(wp), parameter :: on_separatrix = 1.0e-270_wp
 
-    !> alpha below this counts as I2 = I3, so that nothing underflows. Both are then far larger than I1: by 1e90,
-    !> or where they agree to their last digit, I3 - I2 > 1.1e-16 I3 yet, by 1e74.
+    !> alpha below this counts as I2 = I3, so that nothing underflows. Both are then far larger than I1: by
+    !> 1e90, or where they agree to their last digit, I3 - I2 > 1.1e-16 I3 yet, by 1e74.
     real(wp), parameter :: smallest_alpha = 1.0e-90_wp
 
     !> One step in the paper's form; made by `normal_form`.
@@ -220,10 +220,10 @@ contains
         end if
     end function add_momentum
 
-    !> The turn of a body as a change of its attitude, in the caller's axes: `turn` is sense (1 + change) but for
-    !> its norm. The norm of 1 + change is one to the rounding of change, so that an attitude which is advanced
-    !> as old value plus change keeps its norm: a turn which is short or long by a part of a rounding, in the same
-    !> way in every step of a chain, would let it grow.
+    !> The turn of a body as a change of its attitude, in the caller's axes: `turn` is sense (1 + change) but
+    !> for its norm. The norm of 1 + change is one to the rounding of change, so that an attitude which is
+    !> advanced as old value plus change keeps its norm: a turn which is short or long by a part of a
+    !> rounding, in the same way in every step of a chain, would let it grow.
     pure subroutine turn_from_one(motion, turn, change, sense)
         type(paper_motion), intent(in) :: motion
         real(wp), intent(in) :: turn(4)         !! a quaternion of norm one to rounding, sorted axes

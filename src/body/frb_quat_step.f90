@@ -34,13 +34,13 @@ contains
     !> turn from qin to qout then has a scalar part >= 0.
     !>
     !> Accuracy of the exact step, in units of the inherent sensitivity (data/reference): in every group a
-    !> median below 1 and a maximum below 3, for m and for q in each frame; the turn from qin to qout is unit to
-    !> 1e-14 (checked by steps). In a chain of 20 000 steps |m|, the energy, q m q* and |q| stay to 1e-13 (checked
-    !> by step-laws); rounding adds up like a random walk, as the square root of the number of steps. The sensitivity itself grows near the middle axis
-    !> and the separatrix: once h covers a half turn, m and q lose about log10(1/(1 - k**2)) of 16 digits.
-    !> The frames have poles, where p turns fast: m along -e3 for (1), along any principal axis for (2), along
-    !> +-e3 for (3). Exact steps lose nothing there; semi-exact ones about log10(1/distance) digits, and their
-    !> order shows for smaller h only.
+    !> median below 1 and a maximum below 3, for m and for q in each frame; the turn from qin to qout is unit
+    !> to 1e-14 (checked by steps). In a chain of 20 000 steps |m|, the energy, q m q* and |q| stay to 1e-13
+    !> (checked by step-laws); rounding adds up like a random walk, as the square root of the number of steps.
+    !> The sensitivity itself grows near the middle axis and the separatrix: once h covers a half turn, m and
+    !> q lose about log10(1/(1 - k**2)) of 16 digits. The frames have poles, where p turns fast: m along -e3
+    !> for (1), along any principal axis for (2), along +-e3 for (3). Exact steps lose nothing there;
+    !> semi-exact ones about log10(1/distance) digits, and their order shows for smaller h only.
     !>
     !> Errors: status_bad_moments (not positive and finite), status_bad_momentum, status_bad_time,
     !> status_bad_attitude (not finite, zero, or beyond 1e300), status_bad_count (np < 0 or np > 1000),

@@ -149,6 +149,8 @@ contains
             else
                 values%points = nint(number)
             end if
+        case default
+            error = file%complaint(letter, 'an item of a layout', 'none')
         end select
     end subroutine read_item
 

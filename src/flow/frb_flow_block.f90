@@ -1,7 +1,7 @@
-!> The free flow of a block of bodies, one per SIMD lane: the formulas of frb_flow_one in loops of fixed length
-!> that the compiler vectorises. What happens to a body depends on itself alone, not on the others of its block,
-!> so results are the same for any split of the bodies. A body that is out of reach (many periods in one
-!> step, extreme exponents, refused input) is left to the routine for one body.
+!> The free flow of a block of bodies, one per SIMD lane: the formulas of frb_flow_one in loops of fixed
+!> length that the compiler vectorises. What happens to a body depends on itself alone, not on the others of
+!> its block, so results are the same for any split of the bodies. A body that is out of reach (many periods
+!> in one step, extreme exponents, refused input) is left to the routine for one body.
 module frb_flow_block
     use frb_flow_limits, only: short_limit, small_turn_limit, base_limit, square_limit, period_limit, &
         sin_cos_limit, plain_largest, plain_smallest
@@ -11,9 +11,9 @@ module frb_flow_block
 
     public :: lanes, block_of_bodies, flow_block
 
-    integer, parameter :: lanes = 24    !! bodies in a block: a few vectors, and small enough for memory to keep up
+    integer, parameter :: lanes = 24    !! bodies in a block: a few vectors, and memory keeps up
 
-    !> A block in sorted principal axes, with the parity of the sorting folded into m and the vector part of q.
+    !> A block in sorted principal axes, the parity of the sorting folded into m and the vector part of q.
     type :: block_of_bodies
         real(wp) :: alpha(lanes), beta(lanes), gamma(lanes), a1(lanes), a3(lanes)
         real(wp) :: m(lanes, 3), q(lanes, 0:3)
@@ -33,8 +33,8 @@ module frb_flow_block
 
 contains
 
-    !> Advances the bodies of a block by 2 t: m, and q when `with_attitude`. `served` on entry: 1 for bodies to
-    !> advance; bodies out of reach come back with 0, unchanged. Bodies with 0 must hold finite numbers.
+    !> Advances the bodies of a block by 2 t: m, and q when `with_attitude`. `served` on entry: 1 for bodies
+    !> to advance; bodies out of reach come back with 0, unchanged. Bodies with 0 must hold finite numbers.
     subroutine flow_block(bodies, t, with_attitude)
         type(block_of_bodies), intent(inout) :: bodies
         real(wp), intent(in) :: t
@@ -70,7 +70,7 @@ contains
             many_long = many_long + merge(1, 0, work%long(l) > 0.0_wp)
         end do
         if (resting > 0) call rest_lanes(bodies, work)
-        ! Short and long lanes in one block: each loop runs over all lanes, and each lane takes its own result.
+        ! Short and long lanes in one block: each loop runs over all lanes, each lane takes its own result.
         call short_steps(bodies, t, with_attitude, work)
         if (many_long > 0) call long_steps(bodies, t, work)
         if (with_attitude) then
@@ -132,16 +132,17 @@ contains
             w = r*y
             k0 = merge(work%a(l)*work%g(l)*work%m2(l)**2, 0.0_wp, work%long(l) <= 0.0_wp)
             k = k0*y
-            call short_momentum(u, w, 4*k0*(scd*scd), scd, work%m1(l), work%m2(l), work%m3(l), a23, b31, g12, &
-                                work%d1(l), work%d2(l), work%d3(l))
+            call short_momentum(u, w, 4*k0*(scd*scd), scd, work%m1(l), work%m2(l), work%m3(l), a23, b31, &
+                                g12, work%d1(l), work%d2(l), work%d3(l))
             if (with_attitude) then
                 n = merge(work%nu(l)*y, 0.0_wp, work%long(l) <= 0.0_wp)
                 first = 1 - merge(w, u, work%form(l) > 0.0_wp)
                 second = merge(work%g(l), -work%a(l), work%form(l) > 0.0_wp)
                 work%v0(l) = first*(1 - k)
                 work%v2(l) = -second*first*(work%m2(l)*scd + b31*y)
-                work%v3(l) = -work%form(l)*work%b(l)*(merge(work%m3(l), work%m1(l), work%form(l) > 0.0_wp)*scd &
-                                                      - merge(g12, a23, work%form(l) > 0.0_wp)*y*first)
+                work%v3(l) = -work%form(l)*work%b(l) &
+                             *(merge(work%m3(l), work%m1(l), work%form(l) > 0.0_wp)*scd &
+                               - merge(g12, a23, work%form(l) > 0.0_wp)*y*first)
                 work%angle(l) = merge(bodies%a1(l), bodies%a3(l), work%form(l) > 0.0_wp)*t &
                                 - work%form(l)*work%b(l)*n*sqrt(y)*short_third_kind(u, w, n)
                 call small_turn(work%angle(l)*work%angle(l)*work%gg(l), sinc, work%cosm1(l))

@@ -14,8 +14,8 @@ module frb_flow_many
 
 contains
 
-    !> Many bodies in blocks, one per SIMD lane; body(:) holds one body for all or one for each. The blocks are
-    !> independent: with -fopenmp they are shared among the threads.
+    !> Many bodies in blocks, one per SIMD lane; body(:) holds one body for all or one for each. The blocks
+    !> are independent: with -fopenmp they are shared among the threads.
     subroutine flow_many(body, bodies, h, n, m, code, q)
         integer, intent(in) :: bodies, n            !! bodies: 1 or n
         type(rigid_body), intent(in) :: body(bodies)

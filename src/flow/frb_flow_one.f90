@@ -1,11 +1,12 @@
 !> The free flow of one body, in its principal axes: short steps by series, longer ones by doubling, many
 !> periods by the arithmetic-geometric mean. One case distinction only, on the length of the step.
 !>
-!> Closed form: m by the addition theorem of the elliptic functions written in m itself; attitude q e z with e a
-!> rotation about m by an angle with one integral of the third kind, z algebraic. Every update is an increment.
+!> Closed form: m by the addition theorem of the elliptic functions written in m itself; attitude q e z with e
+!> a rotation about m by an angle with one integral of the third kind, z algebraic. Updates are increments.
 module frb_flow_one
-    use frb_flow_limits, only: short_limit, tiny_limit, tiny_turn_limit, small_turn_limit, middle_turn_limit, &
-        base_limit, square_limit, period_limit, sin_cos_limit, plain_largest, plain_smallest
+    use frb_flow_limits, only: short_limit, tiny_limit, tiny_turn_limit, small_turn_limit, &
+        middle_turn_limit, base_limit, square_limit, period_limit, sin_cos_limit, plain_largest, &
+        plain_smallest
     use frb_flow_periods, only: reduce_periods
     use frb_inertia, only: rigid_body
     use frb_kinds, only: wp
@@ -65,8 +66,8 @@ contains
         ! sees a NaN, no sum or product overflows on the way.
         largest = 0.25_wp*abs(m1) + 0.25_wp*abs(m2) + 0.25_wp*abs(m3)
         plain = ieee_is_finite(largest) .and. ieee_is_finite(t)
-        if (plain) plain = largest < plain_largest .and. largest > plain_smallest .and. abs(t) < plain_largest &
-            .and. body%a(1) < plain_largest
+        if (plain) plain = largest < plain_largest .and. largest > plain_smallest &
+            .and. abs(t) < plain_largest .and. body%a(1) < plain_largest
         if (present(q)) then
             largest = 0.25_wp*abs(q(1)) + 0.25_wp*abs(q(2)) + 0.25_wp*abs(q(3)) + 0.25_wp*abs(q(4))
             if (plain) plain = ieee_is_finite(largest)

@@ -11,8 +11,9 @@ contains
     !> Quarter period T4 = K(k)/lambda of the triple and the integral H(T4) of the third kind over it, as
     !> H/T4 = mean, in the unit of time of pmax = max(P, R), delta = |R - P| > 0 and nu:
     !> T4 = pi/(2 agm(sqrt(pmax), sqrt(delta))), and from the same sequence
-    !> mean = sum_j Q_j/(2 (pmax + nu)), Q_0 = 1, Q_(j+1) = Q_j e_j/2, e_j = (p_j^2 - a_j g_j)/(p_j^2 + a_j g_j),
-    !> p_(j+1) = (p_j^2 + a_j g_j)/(2 p_j), p_0^2 = pmax + nu (DLMF 19.8.7 with alpha^2 = -nu/pmax).
+    !> mean = sum_j Q_j/(2 (pmax + nu)), Q_0 = 1, Q_(j+1) = Q_j e_j/2,
+    !> e_j = (p_j^2 - a_j g_j)/(p_j^2 + a_j g_j), p_(j+1) = (p_j^2 + a_j g_j)/(2 p_j), p_0^2 = pmax + nu
+    !> (DLMF 19.8.7 with alpha^2 = -nu/pmax).
     !> The period is taken from the series of K as soon as a_j and g_j are close, while the sum goes on.
     !> Accuracy: 4 units of 2^-53 relative.
     pure subroutine quarter_period(pmax, delta, nu, with_mean, period, mean)
@@ -57,8 +58,9 @@ contains
 
     !> Takes whole half periods 2 T4 out of the time 1: what is left is `fraction`, |fraction| <= T4;
     !> an odd number of them turns the sign of s and of the cn-like function, `turned` = -1; the integral of
-    !> the third kind over what is taken out is `whole`. On the separatrix (delta < 1e-200 pmax) there are no periods: the motion has
-    !> settled on the middle axis to all digits after 60 units of 1/lambda, and the rest is uniform.
+    !> the third kind over what is taken out is `whole`. On the separatrix (delta < 1e-200 pmax) there are no
+    !> periods: the motion has settled on the middle axis to all digits after 60 units of 1/lambda, and the
+    !> rest is uniform.
     pure subroutine reduce_periods(pmax, delta, nu, with_whole, fraction, turned, whole)
         real(wp), intent(in) :: pmax, delta, nu
         logical, intent(in) :: with_whole       !! .false.: `whole` is not wanted and comes back 0

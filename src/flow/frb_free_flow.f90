@@ -1,5 +1,5 @@
-!> The exact flow of the free rigid body, `free_flow`: momentum only, with a quaternion, with a matrix; for one
-!> body and for many. One formula for every orbit: no case is special, no input of finite numbers fails.
+!> The exact flow of the free rigid body, `free_flow`: momentum only, with a quaternion, with a matrix; for
+!> one body and for many. One formula for every orbit: no case is special, no input of finite numbers fails.
 !>
 !> State: m, angular momentum in the body; q or a, attitude, body to space. Any consistent units. Both are
 !> advanced in place by the time h, of any sign and size, as m + increment and q + increment: N short steps
@@ -127,8 +127,9 @@ contains
         integer :: code
 
         code = status_bad_count
-        if (size(m, 1) == 3 .and. size(q, 1) == 4 .and. size(m, 2) == size(q, 2)) &
+        if (size(m, 1) == 3 .and. size(q, 1) == 4 .and. size(m, 2) == size(q, 2)) then
             call flow_many([body], 1, h, size(m, 2), m, code, q)
+        end if
         call conclude(code, 'free_flow', stat)
     end subroutine flow_quaternions
 
@@ -141,8 +142,9 @@ contains
         integer :: code
 
         code = status_bad_count
-        if (size(m, 1) == 3 .and. size(body) == size(m, 2)) &
+        if (size(m, 1) == 3 .and. size(body) == size(m, 2)) then
             call flow_many(body, size(body), h, size(m, 2), m, code)
+        end if
         call conclude(code, 'free_flow', stat)
     end subroutine flow_momenta_of_bodies
 
@@ -156,8 +158,10 @@ contains
         integer :: code
 
         code = status_bad_count
-        if (size(m, 1) == 3 .and. size(q, 1) == 4 .and. size(m, 2) == size(q, 2) .and. size(body) == size(m, 2)) &
+        if (size(m, 1) == 3 .and. size(q, 1) == 4 .and. size(m, 2) == size(q, 2) &
+            .and. size(body) == size(m, 2)) then
             call flow_many(body, size(body), h, size(m, 2), m, code, q)
+        end if
         call conclude(code, 'free_flow', stat)
     end subroutine flow_quaternions_of_bodies
 

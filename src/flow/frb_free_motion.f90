@@ -1,8 +1,8 @@
 !> One free motion at many times: `free_motion`, with its period and its precession, constants set up once.
 !>
-!> After one period T the momentum in the body is back and the attitude has turned about the momentum, fixed in
-!> space, by the angle of precession. So m and q at any time are those at a time within half a period of the
-!> start, turned n times; the error of the phase grows with the rounding of T and of the angle alone.
+!> After one period T the momentum in the body is back and the attitude has turned about the momentum, fixed
+!> in space, by the angle of precession. So m and q at any time are those at a time within half a period of
+!> the start, turned n times; the error of the phase grows with the rounding of T and of the angle alone.
 module frb_free_motion
     use frb_flow_periods, only: quarter_period
     use frb_free_flow, only: free_flow
@@ -21,13 +21,13 @@ module frb_free_motion
     !> `status` is not status_ok when the body, m or q was refused; `at` then hands it on.
     type :: free_motion
         integer :: status = status_bad_momentum
-        logical :: periodic = .false.       !! .false. on a separatrix, on the middle axis, for a sphere, m = 0
+        logical :: periodic = .false.       !! not on a separatrix or the middle axis, for a sphere, m = 0
         type(rigid_body), private :: body
         real(wp), private :: m0(3) = 0.0_wp
         real(wp), private :: q0(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
         real(wp), private :: axis(3) = 0.0_wp       !! direction of the momentum in space
         real(wp), private :: period_of_m = 0.0_wp
-        real(wp), private :: half_angle = 0.0_wp    !! half the precession, as the quaternion turns in a period
+        real(wp), private :: half_angle = 0.0_wp    !! half the precession, the turn of q in a period
         real(wp), private :: turns_sign = 1.0_wp    !! -1 when q changes sign besides
     contains
         procedure, private :: at_time
@@ -72,7 +72,7 @@ contains
         call set_up_period(motion)
     end function motion_from_state
 
-    !> Period 4 K(k)/lambda and precession, theta(T) = G T (a1 - beta nu <s^2/(1 + nu s^2)>), or its mirror form.
+    !> Period 4 K(k)/lambda and precession, theta(T) = G T (a1 - beta nu <s^2/(1 + nu s^2)>), or mirrored.
     subroutine set_up_period(motion)
         type(free_motion), intent(inout) :: motion
         real(wp) :: n(3), a(3), alpha, beta, gamma, g, pt, rt, p, r, delta, nu, quarter, mean
@@ -136,7 +136,7 @@ contains
                     if (exponent(t) - exponent(self%period_of_m) > most_digits) then
                         rest = mod(t, self%period_of_m)     ! no digit of the phase is left
                     else
-                        ! Below 2^26 turns number*high is exact: nothing is lost but the rounding of the period.
+                        ! Below 2^26 turns number*high is exact: only the rounding of the period is lost.
                         number = anint(t/self%period_of_m)
                         high = self%period_of_m*splitter
                         high = high - (high - self%period_of_m)
@@ -189,8 +189,8 @@ contains
         call conclude(code, 'free_motion%at', stat)
     end subroutine at_times
 
-    !> Period of the momentum in the body; on a stable axis that of small oscillations about it; Inf where there
-    !> is none (`periodic` is then .false.).
+    !> Period of the momentum in the body; on a stable axis that of small oscillations about it; Inf where
+    !> there is none (`periodic` is then .false.).
     pure function period(self) result(time)
         class(free_motion), intent(in) :: self
         real(wp) :: time
