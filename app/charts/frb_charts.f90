@@ -9,6 +9,7 @@ program frb_charts
     use frb_chart_scale, only: chart_scale
     use frb_chart_scenes, only: chart_scenes
     use frb_chart_top, only: chart_heavy_top, chart_torus
+    use frb_chart_torque, only: chart_torque
     use frb_chart_triangle, only: chart_triangle
     use, intrinsic :: iso_c_binding, only: c_int
     use, intrinsic :: iso_fortran_env, only: error_unit
@@ -24,7 +25,7 @@ program frb_charts
     end interface
 
     character(*), parameter :: names(*) = [character(16) :: 'speed', 'scenes', 'cost', 'work-precision', &
-        'heavy-top', 'failure', 'growth', 'triangle', 'scale', 'orbits']
+        'heavy-top', 'torque', 'failure', 'growth', 'triangle', 'scale', 'orbits']
     type(settings) :: options
     character(:), allocatable :: argument
     logical :: wanted(size(names))
@@ -77,6 +78,8 @@ program frb_charts
             call chart_work_precision(options)
         case ('heavy-top')
             call chart_heavy_top(options)
+        case ('torque')
+            call chart_torque(options)
         case ('failure')
             call chart_failure(options)
         case ('growth')
@@ -115,6 +118,7 @@ contains
         call say('  cost            time per step against step size, all methods')
         call say('  work-precision  error at t = 10 against time spent, three bodies')
         call say('  heavy-top       the same with torque: schemes and drifts on three tops')
+        call say('  torque          tables: cost of the splitting loop, the long run, runs there and back')
         call say('  failure         error against closeness to every place where methods fail')
         call say('  growth          error against the number of steps for the same time')
         call say('  triangle        error of one step h = 1 over all shapes of a body')

@@ -102,9 +102,9 @@ contains
 
     !> A scheme from all coefficients of one step, in the order of use: one more drift than kicks (ABA) or one
     !> more kick than drifts (BAB). `mirrored` writes out a palindrome given up to its centre.
-    !> `status_bad_scheme` unless the coefficients are finite, symmetric to 1e-14 of the largest and sum to
-    !> one within 1e-12, with at most `most_stages` drifts and kicks. What order they have, `conditions`
-    !> tells.
+    !> `status_bad_scheme` unless the coefficients are at most 1e6 in size, symmetric to 1e-14 of the largest
+    !> (or of one) and sum to one within `tolerance`, with at most `most_stages` drifts and kicks. What order
+    !> they have, `conditions` tells.
     pure function scheme_from_coefficients(a, b, name, tolerance) result(scheme)
         real(wp), intent(in) :: a(:)                    !! drifts
         real(wp), intent(in) :: b(:)                    !! kicks
@@ -133,13 +133,13 @@ contains
         real(wp), intent(in) :: c(:)
         real(wp), intent(in) :: inconsistency
         logical :: good
-        real(wp), parameter :: asymmetry = 1.0e-14_wp
+        real(wp), parameter :: asymmetry = 1.0e-14_wp, largest_coefficient = 1.0e6_wp
         real(wp) :: largest
 
         good = all(ieee_is_finite(c))
         if (.not. good) return
         largest = maxval(abs(c))
-        good = largest <= 1.0e6_wp
+        good = largest <= largest_coefficient
         if (good) good = all(abs(c - c(size(c):1:-1)) <= asymmetry*max(largest, 1.0_wp)) &
                          .and. abs(sum(c) - 1) <= inconsistency
     end function consistent

@@ -108,6 +108,7 @@ contains
                              drift)
         end do
 
+        if (code == status_ok .and. .not. all(ieee_is_finite(now%m))) code = status_bad_torque
         if (code == status_ok) then
             m = now%m
             q = now%q
@@ -227,9 +228,15 @@ contains
         real(wp), contiguous, intent(in) :: tau(:, :)
         type(group_state), intent(inout) :: now
         integer, intent(out) :: code
+        real(wp) :: total
+        integer :: i
 
         code = status_bad_torque
-        if (.not. all(ieee_is_finite(tau))) return
+        do i = 1, size(tau, 2)
+            total = 0.25_wp*abs(tau(1, i)) + 0.25_wp*abs(tau(2, i)) + 0.25_wp*abs(tau(3, i))
+            if (.not. ieee_is_finite(total)) return
+            if (total > 0.25_wp*table%largest_torque) return
+        end do
         code = status_ok
         if (table%compensated) then
             call carry(now%m, h*tau, now%m_rest)

@@ -79,6 +79,7 @@ contains
                              drift)
         end do
 
+        if (code == status_ok .and. .not. all(ieee_is_finite(now%m))) code = status_bad_torque
         if (code == status_ok) then
             m = now%m
             q = now%q
@@ -166,9 +167,13 @@ contains
         real(wp), intent(in) :: h, tau(3)
         type(body_state), intent(inout) :: now
         integer, intent(out) :: code
+        real(wp) :: total
 
+        ! A NaN or Inf shows in the sum, which is compared only when there is none.
         code = status_bad_torque
-        if (.not. (ieee_is_finite(tau(1)) .and. ieee_is_finite(tau(2)) .and. ieee_is_finite(tau(3)))) return
+        total = 0.25_wp*abs(tau(1)) + 0.25_wp*abs(tau(2)) + 0.25_wp*abs(tau(3))
+        if (.not. ieee_is_finite(total)) return
+        if (total > 0.25_wp*table%largest_torque) return
         code = status_ok
         if (table%compensated) then
             call carry(now%m, h*tau, now%m_rest)

@@ -21,6 +21,7 @@ module frb_splitting_plan
         real(wp) :: time(most_stages) = 0.0_wp  ! of each torque, from the start of the step
         real(wp) :: outer = 0.0_wp              ! outer stage at the start of the run and where it ends
         real(wp) :: joint = 0.0_wp              ! outer stage between two steps
+        real(wp) :: largest_torque = 0.0_wp     ! of a torque whose kicks do not overflow
         logical :: compensated = .false.
     end type timetable
 
@@ -54,6 +55,7 @@ contains
             table%kick(1:s - 1) = b(2:s)*h
             table%time(s) = h
         end if
+        table%largest_torque = 0.1_wp*huge(h)/max(1.0_wp, maxval(abs(table%kick)), abs(table%joint))
     end function new_timetable
 
     !> What is common to every call: first thing that is wrong, and defaults.
@@ -67,6 +69,7 @@ contains
         integer, intent(out) :: code
         integer, intent(in), optional :: every
         real(wp), intent(in), optional :: t
+        real(wp), parameter :: longest = 1.0e-7_wp*huge(1.0_wp)  ! coefficients are at most 1e6
 
         spacing = 1
         if (present(every)) spacing = every
@@ -78,7 +81,9 @@ contains
         if (code == status_ok) then
             code = status_bad_time
             if (ieee_is_finite(h) .and. ieee_is_finite(start)) then
-                if (abs(h) > 0.0_wp) code = status_ok
+                if (abs(h) > 0.0_wp .and. abs(h) <= longest/max(nsteps, 1) .and. abs(start) <= longest) then
+                    code = status_ok
+                end if
             end if
         end if
     end subroutine check_run

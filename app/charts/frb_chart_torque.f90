@@ -1,0 +1,332 @@
+!> The tables `torque-cost` and `torque-reversal`: what the splitting loop costs over the drifts and kicks it
+!> is made of, what the paper's long run keeps, and how well runs there and back return.
+module frb_chart_torque
+    use frb, only: wp, rigid_body, body_drift, body_observer, drift_by_name, free_flow, group_scene, &
+        heavy_top, integrate, quat_conjugate, quat_rotate, scheme_names, splitting_scheme, total_energy
+    use frb_chart_output, only: settings, open_table, quantile, say, progress
+    use frb_chart_timing, only: clock
+    implicit none
+    private
+
+    public :: chart_torque
+
+    !> A heavy top and its start.
+    type :: top_at_start
+        character(10) :: name = ''
+        type(rigid_body) :: body
+        type(heavy_top) :: top
+        real(wp) :: m0(3) = [1.8_wp, 0.4_wp, -0.9_wp]
+    end type top_at_start
+
+    !> Keeps the energy of every state it is shown.
+    type, extends(body_observer) :: energy_keeper
+        type(top_at_start) :: item
+        integer :: count = 0
+        real(wp) :: energy(0:1000) = 0.0_wp
+    contains
+        procedure :: observe => keep_energy
+    end type energy_keeper
+
+    !> Dipoles along axis 3 of bodies at the points of a square lattice, in each other's field; this is the
+    !> N^2 part with nothing else in it.
+    type, extends(group_scene) :: lattice
+        integer :: side = 1
+    contains
+        procedure :: torques => lattice_torques
+    end type lattice
+
+    real(wp), parameter :: start_q(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+
+contains
+
+    subroutine chart_torque(options)
+        type(settings), intent(in) :: options
+        integer :: unit
+
+        call open_table(options, 'torque-cost', 'the splitting loop: the paper''s heavy top, srkn14, h = 0.5, '// &
+            'and dipoles; medians, with the quartiles of ratios', 'what, value, quartiles', unit)
+        call cost_of_a_step(options, unit)
+        call long_run(options, unit)
+        call cost_of_dipoles(options, unit)
+        close (unit)
+        call open_table(options, 'torque-reversal', '10 000 steps there and back, distance from the start; '// &
+            'growth: of a small change of the start by the turning point, which takes roundings along', &
+            'top, scheme, h, plain, compensated, growth', unit)
+        call reversal(options, unit)
+        close (unit)
+    end subroutine chart_torque
+
+    pure function top_number(number) result(item)
+        integer, intent(in) :: number
+        type(top_at_start) :: item
+
+        select case (number)
+        case (1)
+            item%name = 'paper'
+            item%body = rigid_body([1.0_wp, 1.0126869887825154_wp, 3.3062374224730378_wp])
+            item%top%force = [9.5586303547238536e-5_wp, 4.8777318247201465e-4_wp, -8.6772148817192390e-4_wp]
+            item%m0 = [-0.34790957088547336_wp, -0.19822914599675923_wp, -0.91633189192763642_wp]
+        case (2)
+            item%name = 'asymmetric'
+            item%body = rigid_body([0.6_wp, 0.8_wp, 1.0_wp])
+        case default
+            item%name = 'flat'
+            item%body = rigid_body([0.345_wp, 0.653_wp, 1.0_wp])
+        end select
+    end function top_number
+
+    !> A step of srkn14 against its 14 drifts and 14 kicks done by hand, and with other drifts.
+    subroutine cost_of_a_step(options, unit)
+        type(settings), intent(in) :: options
+        integer, intent(in) :: unit
+        real(wp), parameter :: h = 0.5_wp
+        character(9), parameter :: names(4) = ['free_flow', 'free_flow', 'frb_step ', 'quat_step']
+        type(top_at_start) :: item
+        type(splitting_scheme) :: scheme
+        class(body_drift), allocatable :: drift
+        real(wp), allocatable :: ns(:, :)       ! drifts, kicks, loop, compensated loop, frb_step, quat_step
+        real(wp) :: a(15), b(14), m(3), q(4), tau(3), start
+        integer :: repetitions, steps, r, n, i, stat
+
+        item = top_number(1)
+        scheme = splitting_scheme('srkn14')
+        a = scheme%drift_coefficients()*h
+        b = scheme%kick_coefficients()*h
+        repetitions = merge(9, 51, options%quick)
+        steps = 1000
+        allocate (ns(repetitions, 6))
+        do r = 1, repetitions
+            m = item%m0
+            q = start_q
+            start = clock(.false.)
+            do n = 1, steps
+                do i = 1, 14
+                    call free_flow(item%body, merge(2*a(1), a(i), i == 1), m, q, stat)
+                end do
+            end do
+            ns(r, 1) = clock(.false.) - start
+            start = clock(.false.)
+            do n = 1, steps
+                do i = 1, 14
+                    call item%top%torque(q, 0.0_wp, tau)
+                    m = m + b(i)*tau
+                end do
+            end do
+            ns(r, 2) = clock(.false.) - start
+            do i = 1, 4
+                call drift_by_name(trim(names(i)), drift)
+                m = item%m0
+                q = start_q
+                start = clock(.false.)
+                if (i < 3) then
+                    call integrate(item%body, scheme, item%top, h, steps, m, q, compensated=i == 2, stat=stat)
+                else
+                    call integrate(item%body, scheme, item%top, h, steps, m, q, drift=drift, stat=stat)
+                end if
+                ns(r, 2 + i) = clock(.false.) - start
+            end do
+            call progress(options, 'torque-cost', r, repetitions)
+        end do
+        ns = ns*1.0e9_wp/steps
+        call row(unit, '14 drifts [ns]', ns(:, 1))
+        call row(unit, '14 kicks [ns]', ns(:, 2))
+        call row(unit, 'a step [ns]', ns(:, 3))
+        call row(unit, 'a step / (14 drifts + 14 kicks)', ns(:, 3)/(ns(:, 1) + ns(:, 2)))
+        call row(unit, 'a compensated step / a step', ns(:, 4)/ns(:, 3))
+        do i = 3, 4
+            call row(unit, 'a step with '//trim(names(i))//' / a step', ns(:, 2 + i)/ns(:, 3))
+        end do
+    end subroutine cost_of_a_step
+
+    !> T = 5e4 in 1e5 steps: time, energy, and its trend over the last nine tenths.
+    subroutine long_run(options, unit)
+        type(settings), intent(in) :: options
+        integer, intent(in) :: unit
+        integer, parameter :: blocks = 100
+        character(12), parameter :: names(2) = [character(12) :: 'plain', 'compensated']
+        type(energy_keeper) :: keeper
+        type(splitting_scheme) :: scheme
+        class(body_drift), allocatable :: drift
+        real(wp) :: m(3), q(4), m_other(3), q_other(4), start, seconds, gain(blocks), mean
+        integer :: i
+
+        keeper%item = top_number(1)
+        scheme = splitting_scheme('srkn14')
+        do i = 1, 2
+            m = keeper%item%m0
+            q = start_q
+            keeper%count = 0
+            start = clock(.false.)
+            call integrate(keeper%item%body, scheme, keeper%item%top, 0.5_wp, 100000, m, q, keeper, every=100, &
+                           compensated=i == 2)
+            seconds = clock(.false.) - start
+            gain = keeper%energy(109::9) - keeper%energy(100:991:9)
+            mean = sum(gain)/blocks
+            call row(unit, trim(names(i))//' run to T = 5e4 [s]', [seconds])
+            call row(unit, trim(names(i))//' run: largest error of the energy', &
+                     [maxval(abs(keeper%energy - keeper%energy(0)))])
+            call row(unit, trim(names(i))//' run: trend of the energy over its standard error', &
+                     [abs(mean)/sqrt(sum((gain - mean)**2)/(blocks*(blocks - 1.0_wp)))])
+        end do
+        if (options%quick) return
+        call drift_by_name('frb_step', drift)
+        m_other = keeper%item%m0
+        q_other = start_q
+        call integrate(keeper%item%body, scheme, keeper%item%top, 0.5_wp, 100000, m_other, q_other, drift=drift)
+        call row(unit, 'frb_step against the free flow, distance at T = 5e4', &
+                 [distance(m, q, m_other, q_other)])
+        m_other = keeper%item%m0 + [1.0e-9_wp, 0.0_wp, 0.0_wp]
+        q_other = start_q
+        call integrate(keeper%item%body, scheme, keeper%item%top, 0.5_wp, 100000, m_other, q_other, &
+                       compensated=.true.)
+        call row(unit, 'growth of a small change of the start by T = 5e4', &
+                 [distance(m, q, m_other, q_other)*1.0e9_wp])
+    end subroutine long_run
+
+    !> Drift and kick of n = 1000 dipoles, and a step of srkn14.
+    subroutine cost_of_dipoles(options, unit)
+        type(settings), intent(in) :: options
+        integer, intent(in) :: unit
+        integer, parameter :: n = 1000, drifts = 100
+        real(wp), parameter :: h = 0.1_wp
+        type(lattice) :: scene
+        type(rigid_body) :: body
+        real(wp), allocatable :: m(:, :), q(:, :), tau(:, :), ns(:, :)
+        real(wp) :: start
+        integer :: repetitions, r, i
+
+        repetitions = merge(3, 9, options%quick)
+        scene%side = 32
+        body = rigid_body([1.0_wp, 1.2_wp, 0.3_wp])
+        allocate (m(3, n), q(4, n), tau(3, n), ns(repetitions, 3))
+        do i = 1, n
+            m(:, i) = [sin(1.0_wp*i), cos(2.0_wp*i), sin(3.0_wp*i)]
+            q(:, i) = [cos(1.0_wp*i), sin(2.0_wp*i), cos(3.0_wp*i), sin(5.0_wp*i)]
+            q(:, i) = q(:, i)/norm2(q(:, i))
+        end do
+        do r = 1, repetitions
+            start = clock(.false.)
+            do i = 1, drifts
+                call free_flow(body, h/14, m, q)
+            end do
+            ns(r, 1) = (clock(.false.) - start)/drifts
+            start = clock(.false.)
+            call scene%torques(q, 0.0_wp, tau)
+            m = m + 1.0e-3_wp*tau
+            ns(r, 2) = clock(.false.) - start
+            start = clock(.false.)
+            call integrate(body, splitting_scheme('srkn14'), scene, h, 1, m, q)
+            ns(r, 3) = clock(.false.) - start
+        end do
+        ns = ns*1.0e3_wp
+        call row(unit, 'drift of 1000 dipoles [ms]', ns(:, 1))
+        call row(unit, 'kick of 1000 dipoles [ms]', ns(:, 2))
+        call row(unit, 'drift / kick of 1000 dipoles', ns(:, 1)/ns(:, 2))
+        call row(unit, 'a step of srkn14 / (15 drifts + 14 kicks) of 1000 dipoles', &
+                 ns(:, 3)/(15*ns(:, 1) + 14*ns(:, 2)))
+    end subroutine cost_of_dipoles
+
+    !> There and back with every scheme.
+    subroutine reversal(options, unit)
+        type(settings), intent(in) :: options
+        integer, intent(in) :: unit
+        integer, parameter :: steps = 10000
+        real(wp), parameter :: sizes(4) = [0.001_wp, 0.01_wp, 0.1_wp, 0.5_wp]
+        real(wp), parameter :: small = 1.0e-9_wp
+        type(top_at_start) :: item
+        type(splitting_scheme) :: scheme
+        real(wp) :: m(3), q(4), m_end(3), q_end(4), back(2), growth
+        integer :: number, j, k, i
+
+        do number = 1, 3
+            item = top_number(number)
+            do j = 1, size(sizes)
+                do k = 1, size(scheme_names)
+                    scheme = splitting_scheme(trim(scheme_names(k)))
+                    do i = 1, 2
+                        m_end = item%m0
+                        q_end = start_q
+                        call integrate(item%body, scheme, item%top, sizes(j), steps, m_end, q_end, &
+                                       compensated=i == 2)
+                        m = m_end
+                        q = q_end
+                        call integrate(item%body, scheme, item%top, -sizes(j), steps, m, q, compensated=i == 2)
+                        back(i) = distance(m, q, item%m0, start_q)
+                    end do
+                    m = item%m0 + [small, 0.0_wp, 0.0_wp]
+                    q = start_q
+                    call integrate(item%body, scheme, item%top, sizes(j), steps, m, q, compensated=.true.)
+                    growth = distance(m, q, m_end, q_end)/small
+                    write (unit, '(2a12,f8.3,3es11.2)') item%name, scheme_names(k), sizes(j), back, growth
+                end do
+            end do
+            call progress(options, 'torque-reversal', number, 3)
+        end do
+    end subroutine reversal
+
+    !> Distance of two states, Euclidean; q and -q are the same attitude.
+    pure function distance(m, q, m_other, q_other) result(d)
+        real(wp), intent(in) :: m(3), q(4), m_other(3), q_other(4)
+        real(wp) :: d
+
+        d = sqrt(sum((m - m_other)**2) + min(sum((q - q_other)**2), sum((q + q_other)**2)))
+    end function distance
+
+    !> A row of torque-cost: median and quartiles; on the screen the median.
+    subroutine row(unit, what, values)
+        integer, intent(in) :: unit
+        character(*), intent(in) :: what
+        real(wp), intent(in) :: values(:)
+        character(100) :: line
+
+        write (line, '(2x,a60,es11.3)') what, quantile(values, 0.5_wp)
+        call say(trim(line))
+        write (unit, '(a60,3es11.3)') what, quantile(values, 0.5_wp), quantile(values, 0.25_wp), &
+            quantile(values, 0.75_wp)
+    end subroutine row
+
+    subroutine keep_energy(self, step, t, m, q)
+        class(energy_keeper), intent(inout) :: self
+        integer, intent(in) :: step
+        real(wp), intent(in) :: t, m(3), q(4)
+
+        associate (unused => step)
+        end associate
+        self%energy(self%count) = total_energy(self%item%body, self%item%top, t, m, q)
+        self%count = self%count + 1
+    end subroutine keep_energy
+
+    !> tau_i = Q_i^T (p_i x E_i) with p = Q e3 and E_i the field of all others at centre i.
+    pure subroutine lattice_torques(self, q, t, tau)
+        class(lattice), intent(in) :: self
+        real(wp), contiguous, intent(in) :: q(:, :)
+        real(wp), intent(in) :: t
+        real(wp), contiguous, intent(out) :: tau(:, :)
+        real(wp) :: p(3, size(q, 2)), e(3), x, y, r2, pr, scale3
+        integer :: i, j
+
+        associate (unused => t)
+        end associate
+        do i = 1, size(q, 2)
+            p(:, i) = quat_rotate(q(:, i), [0.0_wp, 0.0_wp, 1.0_wp])
+        end do
+        do i = 1, size(q, 2)
+            e = 0.0_wp
+            do j = 1, size(q, 2)
+                if (j == i) cycle
+                x = real(mod(i, self%side) - mod(j, self%side), wp)
+                y = real(i/self%side - j/self%side, wp)
+                r2 = x*x + y*y
+                pr = 3*(x*p(1, j) + y*p(2, j))/r2
+                scale3 = 0.05_wp/(r2*sqrt(r2))
+                e(1) = e(1) + (pr*x - p(1, j))*scale3
+                e(2) = e(2) + (pr*y - p(2, j))*scale3
+                e(3) = e(3) - p(3, j)*scale3
+            end do
+            tau(:, i) = quat_rotate(quat_conjugate(q(:, i)), &
+                                    [p(2, i)*e(3) - p(3, i)*e(2), p(3, i)*e(1) - p(1, i)*e(3), &
+                                     p(1, i)*e(2) - p(2, i)*e(1)])
+        end do
+    end subroutine lattice_torques
+
+end module frb_chart_torque
