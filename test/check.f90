@@ -23,6 +23,7 @@ program check
     use frb_test_flow_laws, only: test_flow_laws
     use frb_test_flow_runs, only: test_flow_runs
     use frb_test_flow_batches, only: test_flow_batches
+    use frb_test_flow_series, only: test_flow_series
     implicit none
     type(tally) :: t
     character(16) :: argument
@@ -47,6 +48,7 @@ program check
     call test_flow_laws(t)
     call test_flow_runs(t)
     call test_flow_batches(t)
+    call test_flow_series(t)
 
     call get_command_argument(1, argument)
     if (argument == '--fail') then

@@ -266,11 +266,11 @@ contains
         call t%ok('arrays-that-do-not-match-are-left-alone', same([m, q], [m_kept, q_kept]))
     end subroutine check_counts
 
-    !> 1000 bodies, short and long steps, extreme numbers, tensors, bad ones, symmetric ones mixed: the same
+    !> 2000 bodies, short and long steps, extreme numbers, tensors, bad ones, symmetric ones mixed: the same
     !> bits in one call and in any split, for equal and different bodies, with and without attitude.
     subroutine check_splits(t)
         type(tally), intent(inout) :: t
-        integer, parameter :: n = 1000
+        integer, parameter :: n = 2000     ! enough for threads to share, in a build with OpenMP
         integer, parameter :: splits(6) = [1, 7, 24, 32, 37, 500]
         type(stream) :: random
         type(rigid_body), allocatable :: bodies(:)

@@ -1,0 +1,132 @@
+!> The series of the free flow, coefficient by coefficient: in quadruple precision each equals the sum of the
+!> same terms as its recursion makes them, at arguments far beyond those it is used for. Rounding would hide a
+!> wrong last coefficient; this does not.
+module frb_test_flow_series
+    use frb_checks, only: tally
+    use frb_kinds, only: rp => wp
+    use frb_quad_flow_formulas, only: wp, short_series, short_third_kind, base_series, base_third_kind, &
+        small_turn, double_square, double_triple
+    implicit none
+    private
+
+    public :: test_flow_series
+
+    real(rp), parameter :: rounding = 1.0e-31_rp
+    integer, parameter :: most = 20
+
+contains
+
+    subroutine test_flow_series(t)
+        type(tally), intent(inout) :: t
+        real(wp), parameter :: arguments(2, 4) = reshape([0.7_wp, 0.3_wp, 0.1_wp, 0.9_wp, 0.0_wp, 0.8_wp, &
+                                                          0.6_wp, 0.6_wp], [2, 4])
+        real(wp) :: s_terms(0:most), y_terms(0:most), p, r, n, s, y, scd, c, d, error(7), sinc, cosm1
+        integer :: i, k
+
+        call t%open_suite('flow-series', 7)
+        error = 0.0_wp
+        do i = 1, 4
+            p = arguments(1, i)
+            r = arguments(2, i)
+            n = 0.4_wp*i
+            call triple_series(p, r, s_terms)
+            call square_series(p, r, y_terms)
+            call base_series(p, r, 1.0_wp, s, y)
+            error(1) = max(error(1), abs(s - sum(s_terms(:8))))
+            call short_series(p + r, p*r, y, scd)
+            error(2) = max(error(2), abs(y - sum(y_terms(:5))))
+            error(3) = max(error(3), abs(scd - sum([((k + 1)*y_terms(k), k=0, 5)])))
+            error(4) = max(error(4), abs(base_third_kind(p, r, n) - third_kind(p, r, n, 8)))
+            error(5) = max(error(5), abs(short_third_kind(p, r, n) - third_kind(p, r, n, 4)))
+            ! s at t = 1/16 from its series, to 1e-34, doubled twice in each way to t = 1/4.
+            call triple_series(p/256, r/256, s_terms)
+            s = sum(s_terms)/16
+            y = s*s
+            c = sqrt(1 - max(p, r)*y)
+            d = sqrt(1 - min(p, r)*y)
+            do k = 1, 2
+                call double_triple(max(p, r), abs(r - p), s, c, d)
+            end do
+            call double_square(p, r, y, n, scd)
+            call double_square(p, r, y, n, scd)
+            call triple_series(p/16, r/16, s_terms)
+            error(6) = max(error(6), abs(s - sum(s_terms)/4), abs(n - sum(s_terms)/4), abs(scd - c*d))
+        end do
+        call small_turn(0.5_wp, sinc, cosm1)
+        s = 0.0_wp
+        c = 0.0_wp
+        p = 1.0_wp
+        do k = 0, 5
+            if (k > 0) c = c + p*(-0.5_wp)**k
+            s = s + p/(2*k + 1)*(-0.5_wp)**k
+            p = p/((2*k + 1)*(2*k + 2))
+        end do
+        error(7) = max(abs(sinc - s), abs(cosm1 - c))
+        call t%at_most('s-of-a-long-step-is-its-series-to-degree-8', real(error(1), rp), rounding)
+        call t%at_most('s-squared-of-a-short-step-is-its-series-to-degree-5', real(error(2), rp), rounding)
+        call t%at_most('derivative-of-s-squared-is-its-series-to-degree-5', real(error(3), rp), rounding)
+        call t%at_most('integral-of-a-long-step-is-its-series-to-degree-8', real(error(4), rp), rounding)
+        call t%at_most('integral-of-a-short-step-is-its-series-to-degree-4', real(error(5), rp), rounding)
+        call t%at_most('doublings-of-the-triple-agree', real(error(6), rp), rounding)
+        call t%at_most('sine-and-cosine-of-a-small-turn-are-their-series', real(error(7), rp), rounding)
+        call t%close_suite()
+    end subroutine test_flow_series
+
+    !> Coefficients of s/t in t^2, at t = 1, from s'' = -(P + R) s + 2 P R s^3, s(0) = 0, s'(0) = 1.
+    pure subroutine triple_series(p, r, terms)
+        real(wp), intent(in) :: p, r
+        real(wp), intent(out) :: terms(0:most)
+        real(wp) :: square(0:most), cube
+        integer :: k
+
+        terms = 0.0_wp
+        square = 0.0_wp
+        terms(0) = 1.0_wp
+        terms(1) = -(p + r)/6
+        do k = 1, most - 1
+            ! s^3 starts at t^3: its term of t^(2k+1) is the product of degree k - 1.
+            square(k - 1) = dot_product(terms(:k - 1), terms(k - 1:0:-1))
+            cube = dot_product(square(:k - 1), terms(k - 1:0:-1))
+            terms(k + 1) = (2*p*r*cube - (p + r)*terms(k))/((2*k + 2)*(2*k + 3))
+        end do
+    end subroutine triple_series
+
+    !> Coefficients of y/t^2 in t^2, at t = 1, from y'' = 2 - 4 (P + R) y + 6 P R y^2.
+    pure subroutine square_series(p, r, terms)
+        real(wp), intent(in) :: p, r
+        real(wp), intent(out) :: terms(0:most)
+        real(wp) :: square
+        integer :: k
+
+        terms = 0.0_wp
+        terms(0) = 1.0_wp
+        do k = 1, most
+            square = 0.0_wp
+            if (k >= 2) square = dot_product(terms(:k - 2), terms(k - 2:0:-1))
+            terms(k) = (6*p*r*square - 4*(p + r)*terms(k - 1))/((2*k + 2)*(2*k + 1))
+        end do
+    end subroutine square_series
+
+    !> The sum to degree `last` of h_k/(2k+3): h_k = g_k - n h_(k-1), g_k the coefficients of
+    !> ((1 - u x)(1 - w x))^(-1/2), (k+1) g_(k+1) = (2k+1) (u+w)/2 g_k - k u w g_(k-1).
+    pure function third_kind(u, w, n, last) result(total)
+        real(wp), intent(in) :: u, w, n
+        integer, intent(in) :: last
+        real(wp) :: total
+        real(wp) :: g, before, next, h
+        integer :: k
+
+        g = 1.0_wp
+        before = 0.0_wp
+        h = 1.0_wp
+        total = h/3
+        do k = 0, last - 1
+            next = ((2*k + 1)*(u + w)/2*g - k*u*w*before)/(k + 1)
+            before = g
+            g = next
+            h = g - n*h
+            total = total + h/(2*k + 5)
+        end do
+    end function third_kind
+
+end module frb_test_flow_series
