@@ -1,7 +1,6 @@
 !> A square lattice of dipoles that turn about fixed centres, each along axis 3 of its body, in the field of
-!> all the
-!> others: V = sum over pairs of (p_i . p_j - 3 (p_i . r)(p_j . r))/|r|^3. No image charges, no damping.
-!> The torques cost N^2, the free flow N.
+!> all the others: V = sum over pairs of (p_i . p_j - 3 (p_i . r)(p_j . r)/|r|^2)/|r|^3. No image charges, no
+!> damping. The torques cost N^2, the free flow N.
 module frb_dipole_lattice
     use frb, only: wp, group_scene, quat_conjugate, quat_rotate
     implicit none

@@ -18,10 +18,10 @@ module frb_splitting
     !> For n bodies m is (3, n), q is (4, n), the body a scalar or body(n), scene and observer those of a
     !> group. q is handed to the torque as it is, so its norm must be one to the accuracy wanted; it is kept.
     !> Refused with `stat`, the state and t untouched: a body or scheme that could not be made (their own
-    !> code); h zero, h or t not finite, or nsteps*h beyond 1e301 (`status_bad_time`); nsteps < 0, every < 1 or
-    !> sizes that differ (`status_bad_count`); m not finite (`status_bad_momentum`); q not finite or of norm
-    !> zero (`status_bad_attitude`); a torque that is not finite, or so large that m overflows, at any time of
-    !> the run (`status_bad_torque`).
+    !> code); h zero, h or t not finite, or nsteps*h beyond 1e301 (`status_bad_time`); nsteps < 0, every < 1
+    !> or sizes that differ (`status_bad_count`); m not finite (`status_bad_momentum`); q not finite or of
+    !> norm zero (`status_bad_attitude`); a torque that is not finite, or so large that m overflows, at any
+    !> time of the run (`status_bad_torque`).
     !>
     !> `compensated` carries the rounding error of every update of m and q over to the next one. It takes
     !> about 40 % more time and pays in long runs of small steps: there energy, momentum and norm stay within
