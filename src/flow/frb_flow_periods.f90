@@ -21,9 +21,9 @@ contains
         logical, intent(in) :: with_mean                    !! .false.: the period alone is wanted, mean is 0
         real(wp), intent(out) :: period, mean
         integer, parameter :: most = 20                     ! the mean of 1 and 1e-308 needs 14
-        real(wp), parameter :: close_enough = 1.0e-8_wp     ! the next mean is then right to rounding
+        real(wp), parameter :: negligible = 1.0e-17_wp      ! bound of the next term: e_(j+1) < e_j^2
         real(wp), parameter :: close_for_series = 0.08_wp   ! x^14 of the series is then below rounding
-        real(wp) :: a, g, p, ag, pp, q, sum_q, x2
+        real(wp) :: a, g, p, ag, pp, e, q, sum_q, x2
         logical :: found
         integer :: j
 
@@ -46,10 +46,11 @@ contains
             if (found .and. .not. with_mean) return
             ag = a*g
             pp = p*p
-            q = 0.5_wp*q*((pp - ag)/(pp + ag))
+            e = (pp - ag)/(pp + ag)
+            q = 0.5_wp*q*e
             p = (pp + ag)/(2*p)
             sum_q = sum_q + q
-            if (found .and. abs(a - g) <= close_enough*a) exit
+            if (found .and. abs(q)*e*e <= negligible) exit
             a = 0.5_wp*(a + g)
             g = sqrt(ag)
         end do
