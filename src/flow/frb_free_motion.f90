@@ -76,6 +76,7 @@ contains
     subroutine set_up_period(motion)
         type(free_motion), intent(inout) :: motion
         real(wp) :: n(3), a(3), alpha, beta, gamma, g, pt, rt, p, r, delta, nu, quarter, mean
+        integer, parameter :: largest_exponent = 900    ! periods beyond 2^900 or under 2^-900 are of no use
         integer :: em, ea
         logical :: first_form
 
@@ -97,11 +98,12 @@ contains
         p = gamma*pt
         r = alpha*rt
         delta = beta*((alpha*n(3)**2) - (gamma*n(1)**2))     ! exactly 0 on the separatrix, with FMA too
-        motion%periodic = abs(delta) > 0.0_wp
-        if (.not. motion%periodic) return
+        if (abs(delta) <= 0.0_wp) return
         first_form = gamma*rt <= alpha*pt
         nu = merge(gamma*rt, alpha*pt, first_form)
         call quarter_period(max(p, r), abs(delta), nu, .true., quarter, mean)
+        if (abs(exponent(quarter) - (em + ea)) > largest_exponent) return
+        motion%periodic = .true.
         if (first_form) then
             motion%half_angle = 2*quarter*g*(a(1) - beta*nu*mean)
             motion%turns_sign = merge(1.0_wp, -1.0_wp, delta <= 0.0_wp)
@@ -158,8 +160,8 @@ contains
         call conclude(code, 'free_motion%at', stat)
     end subroutine at_time
 
-    !> m(3, n), and q(4, n) when present, at the n times t. status_bad_count if the sizes do not match; the
-    !> arrays then hold the state at t = 0.
+    !> m(3, n), and q(4, n) when present, at the n times t. status_bad_count if the sizes do not match. Refused,
+    !> the arrays hold the state at t = 0, or zeros if they have not 3 and 4 rows.
     subroutine at_times(self, t, m, q, stat)
         class(free_motion), intent(in) :: self
         real(wp), intent(in) :: t(:)
@@ -175,7 +177,11 @@ contains
         end if
         if (code /= status_ok) then
             m = 0.0_wp
-            if (present(q)) q = 0.0_wp
+            if (size(m, 1) == 3) m = spread(self%m0, 2, size(m, 2))
+            if (present(q)) then
+                q = 0.0_wp
+                if (size(q, 1) == 4) q = spread(self%q0, 2, size(q, 2))
+            end if
         else
             do i = 1, size(t)
                 if (present(q)) then
