@@ -20,8 +20,9 @@ module frb_test_flow_batches
     real(wp), parameter :: eps = epsilon(1.0_wp)
     real(wp), parameter :: moments(3) = [0.4_wp, 1.0_wp, 0.7_wp]
     real(wp), parameter :: m0(3) = [0.3_wp, -0.9_wp, 0.5_wp], q0(4) = [0.5_wp, -0.5_wp, 0.1_wp, 0.7_wp]
-    !> Norms, momentum in space, and the energy (relative to the kinetic energy of |m|^2/(2 I1)), one step.
-    real(wp), parameter :: on_the_orbit = 64*eps
+    !> Norms and energy (relative to |m|^2/(2 I1)) after one step; momentum in space. Measured 2 and 33 eps.
+    real(wp), parameter :: on_the_orbit = 8*eps
+    real(wp), parameter :: in_space = 64*eps
     !> The same where a deviation grows by 1e4 or more: next to the separatrix, over many decay times.
     real(wp), parameter :: next_to_separatrix = 1.0e-11_wp
     !> There and back, and a batch against one by one, in units of a rough inherent sensitivity; measured 16
@@ -411,7 +412,7 @@ contains
         call t%at_most('fuzz-keeps-q-unit', orbit(1), on_the_orbit)
         call t%at_most('fuzz-keeps-the-norm-of-m', orbit(2), on_the_orbit)
         call t%at_most('fuzz-keeps-the-energy', orbit(3), on_the_orbit)
-        call t%at_most('fuzz-keeps-the-momentum-in-space', orbit(4), on_the_orbit)
+        call t%at_most('fuzz-keeps-the-momentum-in-space', orbit(4), in_space)
         call t%at_most('fuzz-next-to-the-separatrix-stays-close-to-the-orbit', sensitive, next_to_separatrix)
         call t%at_most('fuzz-there-and-back', error, returned)
         call t%at_most('fuzz-batches-agree-with-one-by-one', batch, same_in_batch)

@@ -33,8 +33,8 @@ module frb_test_flow_runs
     !> Measured: 0.06 and 0.9.
     real(wp), parameter :: bias = 0.25_wp
     real(wp), parameter :: walk_length = 4.0_wp
-    !> Drift of one motion in a long step, in units of 2^-53. Measured: 1.2 (m), 0.1 (q), 1 (energy).
-    real(wp), parameter :: long_drift = 2.0_wp
+    !> Drift of one motion in a long step, in units of 2^-53. Measured: 0.04 (m), 0.11 (q), 0.21 (energy).
+    real(wp), parameter :: long_drift = 0.6_wp
 
 contains
 
@@ -204,11 +204,11 @@ contains
                 call t%at_most('norms-and-energy-walk-at-random', maxval(furthest)/walk, walk_length)
             end associate
         end do
-        call t%at_most('drift-of-the-norm-of-m-in-long-steps-is-about-a-rounding', &
+        call t%at_most('drift-of-the-norm-of-m-in-long-steps-is-below-a-rounding', &
                        furthest(1)/(unit_roundoff*steps), long_drift)
-        call t%at_most('drift-of-the-norm-of-q-in-long-steps-is-about-a-rounding', &
+        call t%at_most('drift-of-the-norm-of-q-in-long-steps-is-below-a-rounding', &
                        furthest(2)/(unit_roundoff*steps), long_drift)
-        call t%at_most('drift-of-the-energy-in-long-steps-is-about-a-rounding', &
+        call t%at_most('drift-of-the-energy-in-long-steps-is-below-a-rounding', &
                        furthest(3)/(unit_roundoff*steps), long_drift)
     end subroutine check_bias
 
