@@ -79,7 +79,14 @@ contains
     !> Principal moments and axes of an inertia tensor: tensor = axes diag(moments) axes^T, by LAPACK's dsyev.
     !> `axes` is a rotation (determinant +1): its columns are the principal axes in the axes of the tensor,
     !> it takes principal components to those of the tensor's axes. `moments` ascend, except that a diagonal
-    !> tensor comes back as it is, in its own order with `axes` the identity.
+    !> tensor comes back as it is, in its own order with `axes` the identity. Moments and axes are those of a
+    !> tensor within a few roundings of the largest moment of the given one.
+    !>
+    !> `frb_step` and `quat_step` then take m and Q in principal axes, and give them back so:
+    !>
+    !>     m = matmul(m, axes);   Q = matmul(Q, axes)                  ! to principal axes
+    !>     m = matmul(axes, m);   Q = matmul(Q, transpose(axes))       ! and back
+    !>
     !> `stat`: `status_bad_tensor` unless finite, symmetric to 8 roundings of the largest entry and positive
     !> definite; `status_lapack_failed` if dsyev does not converge. Moments are then 0, axes the identity.
     subroutine principal_axes(tensor, moments, axes, stat)
