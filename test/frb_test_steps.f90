@@ -17,7 +17,7 @@ module frb_test_steps
     real(wp), parameter :: eps = epsilon(1.0_wp)
 
     !> Median and maximum of the scores in every group, of momentum, matrix, quaternion in each frame.
-    real(wp), parameter :: units(2) = [1.0_wp, 3.0_wp]
+    real(wp), parameter :: units_matrix(2) = [1.0_wp, 3.0_wp], units_frame(2) = [1.5_wp, 3.0_wp]
     real(wp), parameter :: orthogonal_to = 1.0e-14_wp
 
     real(wp), parameter :: no_turn(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
@@ -71,20 +71,20 @@ contains
                 if (any(cases(:i - 1)%group == group)) cycle
             end if
             associate (inside => cases%group == group)
-                call check_scores(t, group//': momentum', pack(score(:, 1), inside))
-                call check_scores(t, group//': matrix', pack(score(:, 2), inside))
+                call check_scores(t, group//': momentum', pack(score(:, 1), inside), units_matrix)
+                call check_scores(t, group//': matrix', pack(score(:, 2), inside), units_matrix)
                 do frame = 1, 3
                     call check_scores(t, group//': quaternion-in-frame-'//achar(48 + frame), &
-                                      pack(score(:, 2 + frame), inside))
+                                      pack(score(:, 2 + frame), inside), units_frame)
                 end do
             end associate
         end do
     end subroutine check_reference_cases
 
-    subroutine check_scores(t, name, scores)
+    subroutine check_scores(t, name, scores, units)
         type(tally), intent(inout) :: t
         character(*), intent(in) :: name
-        real(wp), intent(in) :: scores(:)
+        real(wp), intent(in) :: scores(:), units(2)
 
         ! one check for both: the larger of median and maximum, each over its bound
         call t%at_most(name//'-is-within-its-units', &

@@ -220,26 +220,22 @@ contains
         end if
     end function add_momentum
 
-    !> The turn of a body as a change of its attitude, in the caller's axes: `turn` is sense (1 + change) but
-    !> for its norm. The norm of 1 + change is one to the rounding of change, so that an attitude which is
-    !> advanced as old value plus change keeps its norm: a turn which is short or long by a part of a
-    !> rounding, in the same way in every step of a chain, would let it grow.
+    !> The turn of a body as a change of its attitude, in the caller's axes: `turn` is sense (1 + change). The
+    !> scalar part is formed from the vector part v, q0 - 1 = -|v|**2/(1 + q0), so that the norm of 1 + change
+    !> is one to the rounding of change, and an attitude advanced as old value plus change keeps its norm. A
+    !> turn that is short or long by a part of a rounding, in each step of a chain, would let it grow.
     pure subroutine turn_from_one(motion, turn, change, sense)
         type(paper_motion), intent(in) :: motion
         real(wp), intent(in) :: turn(4)         !! a quaternion of norm one to rounding, sorted axes
         real(wp), intent(out) :: change(4)
         real(wp), intent(out) :: sense          !! -1 or +1, the sign of the scalar part
-        real(wp) :: length2, v(3)
 
-        length2 = turn(2)*turn(2) + turn(3)*turn(3) + turn(4)*turn(4)
         sense = sign(1.0_wp, turn(1))
-        ! one over the norm by its tangent
-        v = turn(2:4)*(sense*(1 - 0.5_wp*((turn(1)*turn(1) - 1) + length2)))
-        change(1) = -(v(1)*v(1) + v(2)*v(2) + v(3)*v(3))/(1 + abs(turn(1)))
+        change(1) = -(turn(2)*turn(2) + turn(3)*turn(3) + turn(4)*turn(4))/(1 + abs(turn(1)))
         if (motion%sorted) then
-            change(2:4) = v
+            change(2:4) = sense*turn(2:4)
         else
-            change(1 + motion%order) = motion%parity*v
+            change(1 + motion%order) = (sense*motion%parity)*turn(2:4)
         end if
     end subroutine turn_from_one
 
