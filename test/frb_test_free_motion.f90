@@ -95,10 +95,12 @@ contains
         call t%equal('sizes-that-differ-are-refused', stat, status_bad_count)
         call t%ok('refused-times-give-the-state-at-the-start', all(abs(ms(:, 4)) <= 0.0_wp) &
                   .and. all(abs(qs(:, 2) - start) <= 0.0_wp))
-        motion = free_motion(rigid_body([1.0e290_wp, 1.5e290_wp, 2.0e290_wp]), [1.0e-12_wp, 2.0e-12_wp, 3.0e-12_wp], start)
+        motion = free_motion(rigid_body([1.0e290_wp, 1.5e290_wp, 2.0e290_wp]), &
+                             [1.0e-12_wp, 2.0e-12_wp, 3.0e-12_wp], start)
         call motion%at(1.0e307_wp, m, q, stat)
         call t%ok('period-near-overflow-does-no-harm', stat == status_ok .and. all(ieee_is_finite(q)))
-        motion = free_motion(rigid_body([1.0e-300_wp, 1.5e-300_wp, 2.0e-300_wp]), [1.0e150_wp, 2.0e150_wp, 3.0e150_wp], start)
+        motion = free_motion(rigid_body([1.0e-300_wp, 1.5e-300_wp, 2.0e-300_wp]), &
+                             [1.0e150_wp, 2.0e150_wp, 3.0e150_wp], start)
         call motion%at(1.0_wp, m, q, stat)
         call t%ok('period-that-underflows-does-no-harm', stat == status_ok .and. .not. motion%periodic &
                   .and. all(ieee_is_finite(q)))
