@@ -160,8 +160,8 @@ contains
         call conclude(code, 'free_motion%at', stat)
     end subroutine at_time
 
-    !> m(3, n), and q(4, n) when present, at the n times t. status_bad_count if the sizes do not match. Refused,
-    !> the arrays hold the state at t = 0, or zeros if they have not 3 and 4 rows.
+    !> m(3, n), and q(4, n) when present, at the n times t. status_bad_count if the sizes do not match.
+    !> Refused, the arrays hold the state at t = 0, or zeros if they have not 3 and 4 rows.
     subroutine at_times(self, t, m, q, stat)
         class(free_motion), intent(in) :: self
         real(wp), intent(in) :: t(:)
