@@ -188,7 +188,7 @@ contains
         do
             over = 0
             do l = 1, lanes
-                n = max(work%p(l), work%r(l), work%nu(l))*f(l)*f(l)
+                n = max(work%p(l), work%r(l))*f(l)*f(l)     ! nu is never larger
                 n = merge(1.0_wp, 0.0_wp, work%long(l) > 0.0_wp .and. n > base_limit)
                 squares(l) = squares(l) + n
                 f(l) = f(l)*(1 - 0.5_wp*n)

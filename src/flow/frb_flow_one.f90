@@ -15,7 +15,7 @@ module frb_flow_one
     implicit none
     private
 
-    public :: flow_body
+    public :: flow_body, flow_one, flow_turned
 
     !> How far a step reaches: which series it takes.
     integer, parameter :: tiny_step = 1, short_step = 2, middle_step = 3, long_reach = 4
@@ -48,7 +48,8 @@ contains
         real(wp), intent(inout) :: m(3)
         integer, intent(out) :: code
         real(wp), intent(inout), optional :: q(4)
-        real(wp) :: t, a, b, g, m1, m2, m3, x1, x2, x3, pt, rt, p, r, rate, gg, largest
+        real(wp) :: t, a, b, g, m1, m2, m3, x1, x2, x3, pt, rt, p, r, rate, gg
+        real(wp) :: size_m, size_q, largest
         real(wp) :: s, y, scd, u, w, k, a23, b31, g12, d1, d2, d3
         real(wp) :: nu, v0, v2, v3, angle, twist, z0, z2, z3, cosm1, sinc, z(3)
         real(wp) :: e1, e2, e3, w0, w1, w2, w3
@@ -64,15 +65,15 @@ contains
         t = 0.5_wp*h
         ! What is finite, not zero and far from overflow goes on; the rest is sorted out apart. No comparison
         ! sees a NaN, no sum or product overflows on the way.
-        largest = 0.25_wp*abs(m1) + 0.25_wp*abs(m2) + 0.25_wp*abs(m3)
-        plain = ieee_is_finite(largest) .and. ieee_is_finite(t)
-        if (plain) plain = largest < plain_largest .and. largest > plain_smallest &
-            .and. abs(t) < plain_largest .and. body%a(1) < plain_largest
+        size_m = 0.25_wp*abs(m1) + 0.25_wp*abs(m2) + 0.25_wp*abs(m3)
+        largest = 0.25_wp*size_m + 0.25_wp*abs(t)
+        size_q = 1.0_wp
         if (present(q)) then
-            largest = 0.25_wp*abs(q(1)) + 0.25_wp*abs(q(2)) + 0.25_wp*abs(q(3)) + 0.25_wp*abs(q(4))
-            if (plain) plain = ieee_is_finite(largest)
-            if (plain) plain = largest > plain_smallest .and. largest < plain_largest
+            size_q = 0.25_wp*abs(q(1)) + 0.25_wp*abs(q(2)) + 0.25_wp*abs(q(3)) + 0.25_wp*abs(q(4))
+            largest = largest + 0.25_wp*size_q
         end if
+        plain = ieee_is_finite(largest)
+        if (plain) plain = max(largest, body%a(1)) < plain_largest .and. min(size_m, size_q) > plain_smallest
         if (plain) then
             rate = body%a(1)*t
             plain = abs(rate) < plain_largest
@@ -93,7 +94,8 @@ contains
         p = g*pt
         r = a*rt
         gg = x1 + x2 + x3
-        if (max(p, r, min(g*rt, a*pt)) > base_limit .or. rate*rate*gg > middle_turn_limit) then
+        ! nu <= max(p, r) needs no test: the product of its two forms is p r.
+        if (max(p, r) > base_limit .or. rate*rate*gg > middle_turn_limit) then
             if (rate*rate*gg > largest_square_angle) then
                 call flow_rescaled(body, h, m, code, q)
                 return
@@ -298,7 +300,7 @@ contains
             f = 0.5_wp*f
             triples = triples + 1
         end do
-        do while (max(pmax, nu)*span > base_limit)
+        do while (pmax*span > base_limit)       ! nu <= pmax: the product of its two forms is p r
             span = 0.25_wp*span
             f = 0.5_wp*f
             squares = squares + 1

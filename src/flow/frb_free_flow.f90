@@ -16,7 +16,7 @@
 !> orbit, at an arbitrary phase.
 module frb_free_flow
     use frb_flow_many, only: flow_many
-    use frb_flow_one, only: flow_body
+    use frb_flow_one, only: flow_body, flow_one, flow_turned
     use frb_inertia, only: rigid_body
     use frb_kinds, only: wp
     use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_count
@@ -46,7 +46,14 @@ contains
         integer, intent(out), optional :: stat
         integer :: code
 
-        call flow_body(body, h, m, code)
+        code = body%status
+        if (code == status_ok) then
+            if (body%turned) then
+                call flow_turned(body, h, m, code)
+            else
+                call flow_one(body, h, m, code)
+            end if
+        end if
         if (present(stat)) then
             stat = code
         else if (code /= status_ok) then
@@ -63,7 +70,14 @@ contains
         integer, intent(out), optional :: stat
         integer :: code
 
-        call flow_body(body, h, m, code, q)
+        code = body%status
+        if (code == status_ok) then
+            if (body%turned) then
+                call flow_turned(body, h, m, code, q)
+            else
+                call flow_one(body, h, m, code, q)
+            end if
+        end if
         if (present(stat)) then
             stat = code
         else if (code /= status_ok) then
