@@ -278,7 +278,7 @@ contains
             'set ylabel "error of attitude, median of 9 bodies  [rad]"', &
             'set title "Cutting the same time into more steps"', &
             'set key outside right center vertical spacing 1.1 samplen 2.2 Left reverse', 'plot \', &
-            '  1.1e-16*sqrt(x) with lines lc rgb "#777777" lw 1 dt 3 title "2^{-53} {/Symbol \326}N", \', &
+            '  1.1e-16*sqrt(x) with lines lc rgb "#777777" lw 1 dt 3 title "2^{-53} N^{1/2}", \', &
             '  1.1e-16*x with lines lc rgb "#777777" lw 1 dt 2 title "2^{-53} N", \'
         k = 0
         do i = 1, size(methods)
