@@ -232,7 +232,8 @@ contains
         end do
         write (unit, '(a)') 'set origin 0.03,0.005', 'set size 0.94,0.16', 'unset border', 'unset tics', &
             'unset ylabel', 'unset title', 'unset grid', 'unset logscale', 'set xrange [0:1]', &
-            'set yrange [0:1]', 'set key center center maxrows 4 samplen 2.2 width -4 spacing 1.2 Left reverse', &
+            'set yrange [0:1]', &
+            'set key center center maxrows 4 samplen 2.2 width -4 spacing 1.2 Left reverse', &
             'plot NaN with boxes fs solid noborder lc rgb "#eeeeee" title "up to 4 units", \'
         entries = 0
         do j = size(shown), 1, -1
