@@ -4,12 +4,18 @@ module frb_quad_flow_formulas
     implicit none
     private
 
-    public :: wp, short_series, short_third_kind, base_series, base_third_kind, small_turn, base_angle
-    public :: short_momentum, long_momentum, unit_increment, join_turns, close_turn, turn
-    public :: double_square, double_triple, double_angle, sin_cos
+    public :: wp, short_series, short_momentum, short_direction, short_third_kind, small_turn, short_norm
+    public :: small_unit_turn, short_scalar_part, middle_series, middle_third_kind, double_square, double_triple
+    public :: base_angle, double_angle, long_momentum, long_direction, sin_cos, join_turns, turn, unit_turn
 
 contains
 
-    include '../src/flow/flow_formulas.inc'
+    include '../src/flow/short_formulas.inc'
+
+    include '../src/flow/middle_formulas.inc'
+
+    include '../src/flow/long_formulas.inc'
+
+    include '../src/flow/turn_formulas.inc'
 
 end module frb_quad_flow_formulas

@@ -3,7 +3,7 @@
 module frb_test_flow_laws
     use, intrinsic :: iso_fortran_env, only: qp => real128
     use frb_checks, only: tally
-    use frb_flow_limits, only: tiny_limit, short_limit, base_limit, square_limit, period_limit, &
+    use frb_flow_limits, only: tiny_limit, short_limit, middle_limit, square_limit, period_limit, &
         tiny_turn_limit, small_turn_limit, middle_turn_limit
     use frb_flow_samples, only: stream, true_case, advanced, settled, near_separatrix, defect, no_turn
     use frb_free_flow, only: free_flow
@@ -378,7 +378,7 @@ contains
     !> score when the turn is no longer small. One body and a batch.
     subroutine check_increments(t)
         type(tally), intent(inout) :: t
-        real(wp), parameter :: limits(8) = [tiny_limit, short_limit, base_limit, square_limit, period_limit, &
+        real(wp), parameter :: limits(8) = [tiny_limit, short_limit, middle_limit, square_limit, period_limit, &
                                             tiny_turn_limit, small_turn_limit, middle_turn_limit]
         real(wp), parameter :: small_turn = 0.5_wp
         type(stream) :: random

@@ -4,8 +4,8 @@
 module frb_test_flow_series
     use frb_checks, only: tally
     use frb_kinds, only: rp => wp
-    use frb_quad_flow_formulas, only: wp, short_series, short_third_kind, base_series, base_third_kind, &
-        small_turn, double_square, double_triple
+    use frb_quad_flow_formulas, only: wp, short_series, short_third_kind, middle_series, middle_third_kind, &
+        small_turn, short_norm, short_scalar_part, double_square, double_triple
     implicit none
     private
 
@@ -20,23 +20,22 @@ contains
         type(tally), intent(inout) :: t
         real(wp), parameter :: arguments(2, 4) = reshape([0.7_wp, 0.3_wp, 0.1_wp, 0.9_wp, 0.0_wp, 0.8_wp, &
                                                           0.6_wp, 0.6_wp], [2, 4])
-        real(wp) :: s_terms(0:most), y_terms(0:most), p, r, n, s, y, scd, c, d, error(7), sinc, cosm1
+        real(wp) :: s_terms(0:most), y_terms(0:most), p, r, n, s, y, z, scd, c, d, error(9), sinc, cosine
         integer :: i, k
 
-        call t%open_suite('flow-series', 7)
+        call t%open_suite('flow-series', 9)
         error = 0.0_wp
         do i = 1, 4
             p = arguments(1, i)
             r = arguments(2, i)
             n = 0.4_wp*i
-            call triple_series(p, r, s_terms)
             call square_series(p, r, y_terms)
-            call base_series(p, r, 1.0_wp, s, y)
-            error(1) = max(error(1), abs(s - sum(s_terms(:8))))
+            call middle_series(p + r, p*r, y, scd)
+            error(1) = max(error(1), abs(y - sum(y_terms(:8))), abs(scd - sum([((k + 1)*y_terms(k), k=0, 9)])))
             call short_series(p + r, p*r, y, scd)
             error(2) = max(error(2), abs(y - sum(y_terms(:5))))
             error(3) = max(error(3), abs(scd - sum([((k + 1)*y_terms(k), k=0, 5)])))
-            error(4) = max(error(4), abs(base_third_kind(p, r, n) - third_kind(p, r, n, 8)))
+            error(4) = max(error(4), abs(middle_third_kind(p, r, n) - third_kind(p, r, n, 7)))
             error(5) = max(error(5), abs(short_third_kind(p, r, n) - third_kind(p, r, n, 4)))
             ! s at t = 1/16 from its series, to 1e-34, doubled twice in each way to t = 1/4.
             call triple_series(p/256, r/256, s_terms)
@@ -44,31 +43,55 @@ contains
             y = s*s
             c = sqrt(1 - max(p, r)*y)
             d = sqrt(1 - min(p, r)*y)
+            z = 1.0_wp
             do k = 1, 2
-                call double_triple(max(p, r), abs(r - p), s, c, d)
+                call double_triple(max(p, r), abs(r - p), s, c, d, z)
             end do
-            call double_square(p, r, y, n, scd)
-            call double_square(p, r, y, n, scd)
+            s = s/z
+            scd = s*(c/z)*(d/z)
+            z = 1.0_wp
+            do k = 1, 2
+                call double_square(p, r, y, c, d, z)
+            end do
+            n = sqrt(y)/z
             call triple_series(p/16, r/16, s_terms)
-            error(6) = max(error(6), abs(s - sum(s_terms)/4), abs(n - sum(s_terms)/4), abs(scd - c*d))
+            error(6) = max(error(6), abs(s - sum(s_terms)/4), abs(n - sum(s_terms)/4), &
+                           abs(scd - n*(c/z)*(d/z)))
         end do
-        call small_turn(0.5_wp, sinc, cosm1)
+        call small_turn(0.5_wp, sinc, cosine)
         s = 0.0_wp
         c = 0.0_wp
         p = 1.0_wp
         do k = 0, 5
-            if (k > 0) c = c + p*(-0.5_wp)**k
+            c = c + p*(-0.5_wp)**k
             s = s + p/(2*k + 1)*(-0.5_wp)**k
             p = p/((2*k + 1)*(2*k + 2))
         end do
-        error(7) = max(abs(sinc - s), abs(cosm1 - c))
-        call t%at_most('s-of-a-long-step-is-its-series-to-degree-8', real(error(1), rp), rounding)
+        error(7) = max(abs(sinc - s), abs(cosine - c))
+        ! 1/sqrt(1 + x) - 1 to degree 7 and sqrt(1 - x) - 1 to degree 10, by their binomial coefficients.
+        s = 0.0_wp
+        c = 1.0_wp
+        do k = 1, 7
+            c = -c*(2*k - 1)/(2*k)*0.5_wp
+            s = s + c
+        end do
+        error(8) = abs(short_norm(0.5_wp) - s)
+        s = 0.0_wp
+        c = 1.0_wp
+        do k = 1, 10
+            c = c*(2*k - 3)/(2*k)*0.5_wp
+            s = s + c
+        end do
+        error(9) = abs(short_scalar_part(0.5_wp) - s)
+        call t%at_most('s-squared-and-its-derivative-of-a-middle-step-are-their-series', real(error(1), rp), rounding)
         call t%at_most('s-squared-of-a-short-step-is-its-series-to-degree-5', real(error(2), rp), rounding)
         call t%at_most('derivative-of-s-squared-is-its-series-to-degree-5', real(error(3), rp), rounding)
-        call t%at_most('integral-of-a-long-step-is-its-series-to-degree-8', real(error(4), rp), rounding)
+        call t%at_most('integral-of-a-middle-step-is-its-series-to-degree-7', real(error(4), rp), rounding)
         call t%at_most('integral-of-a-short-step-is-its-series-to-degree-4', real(error(5), rp), rounding)
         call t%at_most('doublings-of-the-triple-agree', real(error(6), rp), rounding)
         call t%at_most('sine-and-cosine-of-a-small-turn-are-their-series', real(error(7), rp), rounding)
+        call t%at_most('norm-of-a-short-step-is-its-series', real(error(8), rp), rounding)
+        call t%at_most('scalar-part-of-a-small-turn-is-its-series', real(error(9), rp), rounding)
         call t%close_suite()
     end subroutine test_flow_series
 

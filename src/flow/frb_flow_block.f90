@@ -3,8 +3,8 @@
 !> its block, so results are the same for any split of the bodies. A body that is out of reach (many periods
 !> in one step, extreme exponents, refused input) is left to the routine for one body.
 module frb_flow_block
-    use frb_flow_limits, only: short_limit, small_turn_limit, base_limit, square_limit, period_limit, &
-        sin_cos_limit, plain_largest, plain_smallest
+    use frb_flow_limits, only: short_limit, small_turn_limit, middle_limit, square_limit, period_limit, &
+        smallest_denominator, sin_cos_limit
     use frb_kinds, only: wp
     implicit none
     private
@@ -13,7 +13,7 @@ module frb_flow_block
 
     integer, parameter :: lanes = 24    !! bodies in a block: a few vectors, and memory keeps up
 
-    !> A block in sorted principal axes, the parity of the sorting folded into m and the vector part of q.
+    !> A block in sorted principal axes, right-handed: an odd sorting turns the sign of the last one.
     type :: block_of_bodies
         real(wp) :: alpha(lanes), beta(lanes), gamma(lanes), a1(lanes), a3(lanes)
         real(wp) :: m(lanes, 3), q(lanes, 0:3)
@@ -27,8 +27,7 @@ module frb_flow_block
         real(wp) :: form(lanes)                                     !! 1: first form, -1: its mirror image
         real(wp) :: long(lanes)                                     !! 1: beyond the short series, else 0
         real(wp) :: d1(lanes), d2(lanes), d3(lanes)                 !! increments of the momentum
-        real(wp) :: v0(lanes), v2(lanes), v3(lanes)                 !! direction of z
-        real(wp) :: angle(lanes), cosm1(lanes)                      !! e = (1 + cosm1, angle m)
+        real(wp) :: w0(lanes), w1(lanes), w2(lanes), w3(lanes)      !! the turn e z - 1
     end type workspace
 
 contains
@@ -40,7 +39,7 @@ contains
         real(wp), intent(in) :: t
         logical, intent(in) :: with_attitude
         type(workspace) :: work
-        real(wp) :: square, z0, z1, z2, z3, y2, y3, e1, e2, e3, w0, w1, w2, w3
+        real(wp) :: square, y2, y3
         integer :: l, reached, resting, many_long
 
         many_long = 0
@@ -72,18 +71,11 @@ contains
         if (resting > 0) call rest_lanes(bodies, work)
         ! Short and long lanes in one block: each loop runs over all lanes, each lane takes its own result.
         call short_steps(bodies, t, with_attitude, work)
-        if (many_long > 0) call long_steps(bodies, t, work)
+        if (many_long > 0) call long_steps(bodies, t, with_attitude, work)
         if (with_attitude) then
             do l = 1, lanes
-                call unit_increment(work%v0(l), work%v2(l), work%v3(l), z0, z2, z3)
-                z1 = merge(0.0_wp, z3, work%form(l) > 0.0_wp)
-                z3 = merge(z3, 0.0_wp, work%form(l) > 0.0_wp)
-                e1 = work%angle(l)*work%m1(l)
-                e2 = work%angle(l)*work%m2(l)
-                e3 = work%angle(l)*work%m3(l)
-                call join_turns(work%cosm1(l), e1, e2, e3, z0, z1, z2, z3, w1, w2, w3)
-                call close_turn(work%cosm1(l), e1, e2, e3, z0, z1, z2, z3, w0, w1, w2, w3)
-                call turn(w0, w1, w2, w3, bodies%q(l, 0), bodies%q(l, 1), bodies%q(l, 2), bodies%q(l, 3))
+                call turn(work%w0(l), work%w1(l), work%w2(l), work%w3(l), &
+                          bodies%q(l, 0), bodies%q(l, 1), bodies%q(l, 2), bodies%q(l, 3))
             end do
         end if
         do l = 1, lanes
@@ -111,14 +103,15 @@ contains
         end do
     end subroutine rest_lanes
 
-    !> Short steps: increments of m; direction of z and e when `with_attitude`. Lanes that the short series do
-    !> not reach run along with p = r = 0.
+    !> Short steps: increments of m; the turn when `with_attitude`. Lanes that the short series do not reach
+    !> run along with p = r = 0.
     subroutine short_steps(bodies, t, with_attitude, work)
         type(block_of_bodies), intent(in) :: bodies
         real(wp), intent(in) :: t
         logical, intent(in) :: with_attitude
         type(workspace), intent(inout) :: work
-        real(wp) :: p, r, y, scd, u, w, k, k0, a23, b31, g12, first, second, sinc, n
+        real(wp) :: p, r, y, scd, u, w, k, k0, a23, b31, g12, form, first, last, n
+        real(wp) :: v0, v2, v3, angle, along, cosine, square, w1, w2, w3
         integer :: l
 
         do l = 1, lanes
@@ -132,34 +125,41 @@ contains
             w = r*y
             k0 = merge(work%a(l)*work%g(l)*work%m2(l)**2, 0.0_wp, work%long(l) <= 0.0_wp)
             k = k0*y
-            call short_momentum(u, w, 4*k0*(scd*scd), scd, work%m1(l), work%m2(l), work%m3(l), a23, b31, &
+            call short_momentum(u, w, k0*(scd*scd), scd, work%m1(l), work%m2(l), work%m3(l), a23, b31, &
                                 g12, work%d1(l), work%d2(l), work%d3(l))
             if (with_attitude) then
+                ! The mirror form is the first one with the axes (3, 2, 1).
+                form = work%form(l)
                 n = merge(work%nu(l)*y, 0.0_wp, work%long(l) <= 0.0_wp)
-                first = 1 - merge(w, u, work%form(l) > 0.0_wp)
-                second = merge(work%g(l), -work%a(l), work%form(l) > 0.0_wp)
-                work%v0(l) = first*(1 - k)
-                work%v2(l) = -second*first*(work%m2(l)*scd + b31*y)
-                work%v3(l) = -work%form(l)*work%b(l) &
-                             *(merge(work%m3(l), work%m1(l), work%form(l) > 0.0_wp)*scd &
-                               - merge(g12, a23, work%form(l) > 0.0_wp)*y*first)
-                work%angle(l) = merge(bodies%a1(l), bodies%a3(l), work%form(l) > 0.0_wp)*t &
-                                - work%form(l)*work%b(l)*n*sqrt(y)*short_third_kind(u, w, n)
-                call small_turn(work%angle(l)*work%angle(l)*work%gg(l), sinc, work%cosm1(l))
-                work%angle(l) = work%angle(l)*sinc
+                first = merge(work%m1(l), work%m3(l), form > 0.0_wp)
+                last = merge(work%m3(l), work%m1(l), form > 0.0_wp)
+                angle = merge(bodies%a1(l), bodies%a3(l), form > 0.0_wp)*t &
+                        - form*work%b(l)*n*sqrt(y)*short_third_kind(u, w, n)
+                call small_turn(angle*angle*work%gg(l), along, cosine)
+                call short_direction(work%b(l), merge(work%g(l), work%a(l), form > 0.0_wp), &
+                                     merge(w, u, form > 0.0_wp), k, y, scd, work%m2(l), last, b31, &
+                                     merge(g12, a23, form > 0.0_wp), v0, v2, v3)
+                call join_turns(form*cosine, angle*along, first, work%m2(l), last, v0, v2, v3, w1, w2, w3)
+                square = (v0*v0 - 1) + (v2*v2 + v3*v3)
+                call small_unit_turn(short_norm(square), w1, w2, w3, square)
+                work%w0(l) = short_scalar_part(square)
+                work%w1(l) = merge(w1, w3, form > 0.0_wp)
+                work%w2(l) = w2
+                work%w3(l) = merge(w3, w1, form > 0.0_wp)
             end if
         end do
     end subroutine short_steps
 
     !> Steps of lanes beyond the short series, by doubling; others keep what they have.
-    subroutine long_steps(bodies, t, work)
+    subroutine long_steps(bodies, t, with_attitude, work)
         type(block_of_bodies), intent(in) :: bodies
         real(wp), intent(in) :: t
+        logical, intent(in) :: with_attitude
         type(workspace), intent(inout) :: work
-        real(wp) :: s(lanes), y(lanes), c(lanes), d(lanes), cd(lanes), ec(lanes), es(lanes)
+        real(wp) :: s(lanes), y(lanes), z(lanes), c(lanes), d(lanes), ec(lanes), es(lanes)
         real(wp) :: delta(lanes), bg(lanes), f(lanes), triples(lanes), squares(lanes)
-        real(wp) :: norm, n1, n2, n3, cp, dr, sine, cosine, new_y, new_s, new_c, new_d, new_ec, new_es, n
-        real(wp) :: e1, e2, e3
+        real(wp) :: norm, n0, n1, n2, n3, cp, dr, sine, cosine, along, n, v0, v2, v3, e0, form, first, last
+        real(wp) :: new_y, new_z, new_s, new_c, new_d, new_ec, new_es, w0, w1, w2, w3
         integer :: most_triples, most_squares, over, i, l
 
         do l = 1, lanes
@@ -189,7 +189,7 @@ contains
             over = 0
             do l = 1, lanes
                 n = max(work%p(l), work%r(l))*f(l)*f(l)     ! nu is never larger
-                n = merge(1.0_wp, 0.0_wp, work%long(l) > 0.0_wp .and. n > base_limit)
+                n = merge(1.0_wp, 0.0_wp, work%long(l) > 0.0_wp .and. n > middle_limit)
                 squares(l) = squares(l) + n
                 f(l) = f(l)*(1 - 0.5_wp*n)
                 over = over + merge(1, 0, n > 0.0_wp)
@@ -198,26 +198,37 @@ contains
             most_squares = most_squares + 1
         end do
         do l = 1, lanes
-            call base_series(work%p(l), work%r(l), f(l), s(l), y(l))
+            n = f(l)*f(l)
+            call middle_series((work%p(l) + work%r(l))*n, work%p(l)*work%r(l)*(n*n), y(l), new_y)
+            y(l) = y(l)*n
+            s(l) = sqrt(y(l))
             call base_angle(work%p(l), work%r(l), work%nu(l), bg(l), s(l), y(l), ec(l), es(l))
+            c(l) = sqrt(1 - max(work%p(l), work%r(l))*y(l))
+            d(l) = sqrt(1 - min(work%p(l), work%r(l))*y(l))
+            z(l) = 1.0_wp
         end do
         do i = 1, most_squares
             n = real(i, wp)
             do l = 1, lanes
                 new_y = y(l)
+                new_z = z(l)
+                new_s = 2*s(l)*((c(l)*d(l))*z(l))   ! for the angle; that of the motion is the root of y
                 new_ec = ec(l)
                 new_es = es(l)
-                call double_square(work%p(l), work%r(l), new_y, new_s, cd(l))
-                call double_angle(work%nu(l), bg(l), y(l), new_s, cd(l), new_ec, new_es)
+                call double_square(max(work%p(l), work%r(l)), min(work%p(l), work%r(l)), new_y, new_c, new_d, &
+                                   new_z)
+                call double_angle(work%nu(l), bg(l), y(l), z(l), new_s, new_c*new_d, new_z, new_ec, new_es)
                 y(l) = merge(new_y, y(l), squares(l) >= n)
+                z(l) = merge(new_z, z(l), squares(l) >= n)
                 s(l) = merge(new_s, s(l), squares(l) >= n)
+                c(l) = merge(new_c, c(l), squares(l) >= n)
+                d(l) = merge(new_d, d(l), squares(l) >= n)
                 ec(l) = merge(new_ec, ec(l), squares(l) >= n)
                 es(l) = merge(new_es, es(l), squares(l) >= n)
             end do
         end do
         do l = 1, lanes
-            c(l) = sqrt(1 - max(work%p(l), work%r(l))*y(l))
-            d(l) = sqrt(1 - min(work%p(l), work%r(l))*y(l))
+            s(l) = sqrt(y(l))
         end do
         do i = 1, most_triples
             n = real(i, wp)
@@ -225,42 +236,64 @@ contains
                 new_s = s(l)
                 new_c = c(l)
                 new_d = d(l)
+                new_z = z(l)
                 new_ec = ec(l)
                 new_es = es(l)
-                call double_triple(max(work%p(l), work%r(l)), abs(delta(l)), new_s, new_c, new_d)
-                call double_angle(work%nu(l), bg(l), s(l)*s(l), new_s, new_c*new_d, new_ec, new_es)
+                call double_triple(max(work%p(l), work%r(l)), abs(delta(l)), new_s, new_c, new_d, new_z)
+                call double_angle(work%nu(l), bg(l), s(l)*s(l), z(l), new_s, new_c*new_d, new_z, new_ec, &
+                                  new_es)
                 s(l) = merge(new_s, s(l), triples(l) >= n)
                 c(l) = merge(new_c, c(l), triples(l) >= n)
                 d(l) = merge(new_d, d(l), triples(l) >= n)
+                z(l) = merge(new_z, z(l), triples(l) >= n)
                 ec(l) = merge(new_ec, ec(l), triples(l) >= n)
                 es(l) = merge(new_es, es(l), triples(l) >= n)
+            end do
+            do l = 1, lanes
+                n = merge(1/z(l), 1.0_wp, z(l) < smallest_denominator)
+                s(l) = s(l)*n
+                c(l) = c(l)*n
+                d(l) = d(l)*n
+                ec(l) = merge(ec(l)/(abs(ec(l)) + abs(es(l))), ec(l), z(l) < smallest_denominator)
+                z(l) = merge(1.0_wp, z(l), z(l) < smallest_denominator)
             end do
         end do
         do l = 1, lanes
             cp = merge(c(l), d(l), delta(l) <= 0.0_wp)
             dr = merge(d(l), c(l), delta(l) <= 0.0_wp)
-            call long_momentum(delta(l) <= 0.0_wp, work%a(l), work%b(l), work%g(l), s(l), cp, dr, &
-                               work%m1(l), work%m2(l), work%m3(l), 1.0_wp, n1, n2, n3, e1, e2, e3)
-            work%d1(l) = merge(e1, work%d1(l), work%long(l) > 0.0_wp)
-            work%d2(l) = merge(e2, work%d2(l), work%long(l) > 0.0_wp)
-            work%d3(l) = merge(e3, work%d3(l), work%long(l) > 0.0_wp)
-            n = merge(dr, cp, work%form(l) > 0.0_wp)
-            work%v0(l) = merge(n, work%v0(l), work%long(l) > 0.0_wp)
-            n = -merge(work%g(l), -work%a(l), work%form(l) > 0.0_wp)*n*s(l)*n2
-            work%v2(l) = merge(n, work%v2(l), work%long(l) > 0.0_wp)
-            n = -work%form(l)*work%b(l)*s(l)*merge(n3, n1, work%form(l) > 0.0_wp)
-            work%v3(l) = merge(n, work%v3(l), work%long(l) > 0.0_wp)
-            norm = sqrt(work%gg(l))
-            n = merge(bodies%a1(l), bodies%a3(l), work%form(l) > 0.0_wp)*t
-            call sin_cos(work%form(l)*norm*n, sine, cosine)
-            n = 1.5_wp - 0.5_wp*(ec(l)*ec(l) + es(l)*es(l))     ! (ec, es) back to norm one
-            work%cosm1(l) = merge((cosine*ec(l) + sine*es(l))*n - 1, work%cosm1(l), work%long(l) > 0.0_wp)
-            norm = work%form(l)*n/max(norm, tiny(1.0_wp))
-            work%angle(l) = merge((sine*ec(l) - cosine*es(l))*norm, work%angle(l), work%long(l) > 0.0_wp)
+            call long_momentum(delta(l) <= 0.0_wp, work%a(l), work%b(l), work%g(l), s(l), cp, dr, z(l), &
+                               work%m1(l), work%m2(l), work%m3(l), n1, n2, n3, n0, w1, w2, w3)
+            work%d1(l) = merge(w1, work%d1(l), work%long(l) > 0.0_wp)
+            work%d2(l) = merge(w2, work%d2(l), work%long(l) > 0.0_wp)
+            work%d3(l) = merge(w3, work%d3(l), work%long(l) > 0.0_wp)
+            if (with_attitude) then
+                form = work%form(l)
+                first = merge(work%m1(l), work%m3(l), form > 0.0_wp)
+                last = merge(work%m3(l), work%m1(l), form > 0.0_wp)
+                norm = sqrt(work%gg(l))
+                call sin_cos(norm*(merge(bodies%a1(l), bodies%a3(l), form > 0.0_wp)*t), sine, cosine)
+                along = (sine*ec(l) - form*cosine*es(l))/max(norm, tiny(1.0_wp))
+                cosine = cosine*ec(l) + form*sine*es(l)
+                call long_direction(work%b(l), merge(work%g(l), work%a(l), form > 0.0_wp), s(l), &
+                                    merge(dr, cp, form > 0.0_wp), z(l), n0, n2, &
+                                    merge(n3, n1, form > 0.0_wp), v0, v2, v3)
+                call join_turns(form*cosine, along, first, work%m2(l), last, v0, v2, v3, w1, w2, w3)
+                e0 = cosine*v0 - form*along*(work%m2(l)*v2 + last*v3)
+                call unit_turn(e0, w0, w1, w2, w3)
+                work%w0(l) = merge(w0, work%w0(l), work%long(l) > 0.0_wp)
+                work%w1(l) = merge(merge(w1, w3, form > 0.0_wp), work%w1(l), work%long(l) > 0.0_wp)
+                work%w2(l) = merge(w2, work%w2(l), work%long(l) > 0.0_wp)
+                work%w3(l) = merge(merge(w3, w1, form > 0.0_wp), work%w3(l), work%long(l) > 0.0_wp)
+            end if
         end do
     end subroutine long_steps
 
+    include 'short_formulas.inc'
 
-    include 'flow_formulas.inc'
+    include 'middle_formulas.inc'
+
+    include 'long_formulas.inc'
+
+    include 'turn_formulas.inc'
 
 end module frb_flow_block

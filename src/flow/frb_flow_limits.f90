@@ -5,17 +5,18 @@ module frb_flow_limits
     implicit none
     private
 
-    public :: short_limit, tiny_limit, tiny_turn_limit, small_turn_limit, middle_turn_limit, base_limit
-    public :: square_limit, period_limit, sin_cos_limit, plain_largest, plain_smallest
+    public :: short_limit, tiny_limit, tiny_turn_limit, small_turn_limit, middle_limit, middle_turn_limit
+    public :: square_limit, period_limit, smallest_denominator, sin_cos_limit, plain_largest, plain_smallest
 
     real(wp), parameter :: short_limit = 0.002_wp       !! largest max(P, R) (h/2)^2 of the short series
     real(wp), parameter :: tiny_limit = 1.0e-4_wp       !! the same of the first terms alone
     real(wp), parameter :: tiny_turn_limit = 1.0e-3_wp  !! largest square of a half angle of the first terms
     real(wp), parameter :: small_turn_limit = 0.04_wp   !! largest square of a half angle of the short series
-    real(wp), parameter :: middle_turn_limit = 0.6_wp   !! largest square of a half angle of the long series
-    real(wp), parameter :: base_limit = 0.03_wp         !! largest max(P, R, nu) t^2 where doubling starts
+    real(wp), parameter :: middle_limit = 0.03_wp       !! the same of the middle series, the base of doublings
+    real(wp), parameter :: middle_turn_limit = 0.6_wp   !! largest square of a half angle of the middle series
     real(wp), parameter :: square_limit = 0.6_wp        !! largest max(P, R) t^2 to which s^2 alone is doubled
-    real(wp), parameter :: period_limit = 4.0_wp        !! max(P, R) (h/2)^2 from which periods are taken out
+    real(wp), parameter :: period_limit = 16.0_wp       !! max(P, R) (h/2)^2 from which periods are taken out
+    real(wp), parameter :: smallest_denominator = 1.0e-9_wp    !! of the triple before it is formed anew
     real(wp), parameter :: sin_cos_limit = 1.0e5_wp     !! largest argument of sin_cos
     real(wp), parameter :: plain_largest = 1.0e75_wp    !! components whose squares and products are safe
     real(wp), parameter :: plain_smallest = 1.0e-75_wp

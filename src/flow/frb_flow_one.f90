@@ -1,13 +1,12 @@
-!> The free flow of one body, in its principal axes: short steps by series, longer ones by doubling, many
-!> periods by the arithmetic-geometric mean. One case distinction only, on the length of the step.
+!> The free flow of one body, in its principal axes. One case distinction only, on the length of the step:
+!> short ones by series, here; longer ones by doubling, in frb_flow_long.
 !>
 !> Closed form: m by the addition theorem of the elliptic functions written in m itself; attitude q e z with e
 !> a rotation about m by an angle with one integral of the third kind, z algebraic. Updates are increments.
 module frb_flow_one
-    use frb_flow_limits, only: short_limit, tiny_limit, tiny_turn_limit, small_turn_limit, &
-        middle_turn_limit, base_limit, square_limit, period_limit, sin_cos_limit, plain_largest, &
-        plain_smallest
-    use frb_flow_periods, only: reduce_periods
+    use frb_flow_limits, only: short_limit, tiny_limit, tiny_turn_limit, small_turn_limit, middle_limit, &
+        middle_turn_limit, plain_largest, plain_smallest
+    use frb_flow_long, only: long_step
     use frb_inertia, only: rigid_body
     use frb_kinds, only: wp
     use frb_status, only: status_ok, status_bad_momentum, status_bad_attitude, status_bad_time
@@ -18,7 +17,7 @@ module frb_flow_one
     public :: flow_body, flow_one, flow_turned
 
     !> How far a step reaches: which series it takes.
-    integer, parameter :: tiny_step = 1, short_step = 2, middle_step = 3, long_reach = 4
+    integer, parameter :: tiny_step = 1, short_step = 2, middle_step = 3
     real(wp), parameter :: largest_square_angle = 1.0e40_wp
 
 contains
@@ -48,20 +47,19 @@ contains
         real(wp), intent(inout) :: m(3)
         integer, intent(out) :: code
         real(wp), intent(inout), optional :: q(4)
-        real(wp) :: t, a, b, g, m1, m2, m3, x1, x2, x3, pt, rt, p, r, rate, gg
-        real(wp) :: size_m, size_q, largest
-        real(wp) :: s, y, scd, u, w, k, a23, b31, g12, d1, d2, d3
-        real(wp) :: nu, v0, v2, v3, angle, twist, z0, z2, z3, cosm1, sinc, z(3)
-        real(wp) :: e1, e2, e3, w0, w1, w2, w3
-        integer :: i1, i2, i3, i, reach
-        logical :: plain
+        real(wp) :: t, a, b, g, m1, m2, m3, x1, x2, x3, pt, rt, p, r, rate, gg, size_m, size_q, largest
+        real(wp) :: y, scd, u, w, k, a23, b31, g12, d1, d2, d3
+        real(wp) :: nu, v0, v1, v2, v3, angle, twist, cosine, along, square, e0, w0, w1, w2, w3, q3
+        integer :: i1, i2, i3
+        integer :: reach
+        logical :: plain, first_form
 
         i1 = body%order(1)
         i2 = body%order(2)
         i3 = body%order(3)
         m1 = m(i1)
         m2 = m(i2)
-        m3 = m(i3)
+        m3 = body%parity*m(i3)      ! sorted axes are right-handed: the last one turns round if need be
         t = 0.5_wp*h
         ! What is finite, not zero and far from overflow goes on; the rest is sorted out apart. No comparison
         ! sees a NaN, no sum or product overflows on the way.
@@ -94,88 +92,87 @@ contains
         p = g*pt
         r = a*rt
         gg = x1 + x2 + x3
-        ! nu <= max(p, r) needs no test: the product of its two forms is p r.
-        if (max(p, r) > base_limit .or. rate*rate*gg > middle_turn_limit) then
-            if (rate*rate*gg > largest_square_angle) then
-                call flow_rescaled(body, h, m, code, q)
-                return
-            end if
-            reach = long_reach
-            call long_step(body, t, m1, m2, m3, present(q), d1, d2, d3, v0, v2, v3, cosm1, angle)
-            if (present(q)) i = merge(i3, i1, g*rt <= a*pt)
+        square = rate*rate*gg
+        if (max(p, r) <= tiny_limit .and. square <= tiny_turn_limit) then
+            reach = tiny_step
+        else if (max(p, r) <= short_limit .and. square <= small_turn_limit) then
+            reach = short_step
+        else if (max(p, r) <= middle_limit .and. square <= middle_turn_limit) then
+            reach = middle_step
+        else if (square <= largest_square_angle) then
+            call long_step(body, t, m, q)
+            return
         else
-            a23 = (body%parity*a)*(m2*m3)
-            b31 = (body%parity*b)*(m3*m1)
-            g12 = (body%parity*g)*(m1*m2)
-            if (max(p, r) <= tiny_limit .and. rate*rate*gg <= tiny_turn_limit) then
-                reach = tiny_step
-                call tiny_series(p + r, p*r, y, scd)
-            else if (max(p, r) <= short_limit .and. rate*rate*gg <= small_turn_limit) then
-                reach = short_step
-                call short_series(p + r, p*r, y, scd)
-            else
-                reach = middle_step
-                call base_series(p, r, 1.0_wp, s, y)
-                scd = s*sqrt((1 - p*y)*(1 - r*y))
-            end if
-            u = p*y
-            w = r*y
-            k = (a*g*x2)*y
-            call short_momentum(u, w, 4*(a*g*x2)*(scd*scd), scd, m1, m2, m3, a23, b31, g12, d1, d2, d3)
-            if (present(q)) then
-                ! Of the two mirror forms the one with the smaller parameter nu of the third kind.
-                if (g*rt <= a*pt) then
-                    i = i3
-                    nu = g*rt
-                    v0 = (1 - w)*(1 - k)
-                    v2 = -g*(1 - w)*(m2*scd + b31*y)
-                    v3 = -b*(m3*scd - g12*y*(1 - w))
-                    angle = rate
-                    twist = -b*nu
-                else
-                    i = i1
-                    nu = a*pt
-                    v0 = (1 - u)*(1 - k)
-                    v2 = a*(1 - u)*(m2*scd + b31*y)
-                    v3 = b*(m1*scd - a23*y*(1 - u))
-                    angle = body%a(3)*t
-                    twist = b*nu
-                end if
-                select case (reach)
-                case (tiny_step)
-                    angle = angle + twist*tiny_third_kind(p + r, p*r, nu)
-                    call tiny_turn(angle*angle*gg, sinc, cosm1)
-                case (short_step)
-                    angle = angle + twist*y*sqrt(y)*short_third_kind(u, w, nu*y)
-                    call small_turn(angle*angle*gg, sinc, cosm1)
-                case default
-                    angle = angle + twist*y*s*base_third_kind(u, w, nu*y)
-                    call middle_turn(angle*angle*gg, sinc, cosm1)
-                end select
-                angle = angle*sinc
-            end if
+            call flow_rescaled(body, h, m, code, q)
+            return
         end if
-        if (present(q)) then
-            call unit_increment(v0, v2, v3, z0, z2, z3)
-            z = 0.0_wp
-            z(i2) = z2
-            z(i) = z3
-            e1 = angle*m(1)
-            e2 = angle*m(2)
-            e3 = angle*m(3)
-            call join_turns(cosm1, e1, e2, e3, z0, z(1), z(2), z(3), w1, w2, w3)
-            if (reach <= short_step) then
-                ! The scalar part of a small turn follows from the norm.
-                w0 = w1*w1 + w2*w2 + w3*w3
-                w0 = -w0/(1 + sqrt(1 - w0))
-            else
-                call close_turn(cosm1, e1, e2, e3, z0, z(1), z(2), z(3), w0, w1, w2, w3)
-            end if
-            call turn(w0, w1, w2, w3, q(1), q(2), q(3), q(4))
-        end if
+        a23 = a*(m2*m3)
+        b31 = b*(m3*m1)
+        g12 = g*(m1*m2)
+        select case (reach)
+        case (tiny_step)
+            call tiny_series(p + r, p*r, y, scd)
+        case (short_step)
+            call short_series(p + r, p*r, y, scd)
+        case default
+            call middle_series(p + r, p*r, y, scd)
+        end select
+        u = p*y
+        w = r*y
+        k = a*g*x2
+        call short_momentum(u, w, k*(scd*scd), scd, m1, m2, m3, a23, b31, g12, d1, d2, d3)
         m(i1) = m1 + d1
         m(i2) = m2 + d2
-        m(i3) = m3 + d3
+        m(i3) = body%parity*(m3 + d3)
+        if (.not. present(q)) return
+
+        ! Of the two mirror forms the one with the smaller parameter nu of the third kind.
+        first_form = g*rt <= a*pt
+        if (first_form) then
+            nu = g*rt
+            angle = rate
+            twist = -b*nu
+        else
+            nu = a*pt
+            angle = body%a(3)*t
+            twist = b*nu
+        end if
+        select case (reach)
+        case (tiny_step)
+            angle = angle + twist*tiny_third_kind(p + r, p*r, nu)
+            call tiny_turn(angle*angle*gg, along, cosine)
+        case (short_step)
+            angle = angle + twist*y*sqrt(y)*short_third_kind(u, w, nu*y)
+            call small_turn(angle*angle*gg, along, cosine)
+        case default
+            angle = angle + twist*y*sqrt(y)*middle_third_kind(u, w, nu*y)
+            call middle_turn(angle*angle*gg, along, cosine)
+        end select
+        along = angle*along
+        if (first_form) then
+            call short_direction(b, g, w, k*y, y, scd, m2, m3, b31, g12, v0, v2, v3)
+            call join_turns(cosine, along, m1, m2, m3, v0, v2, v3, w1, w2, w3)
+            e0 = cosine*v0 - along*(m2*v2 + m3*v3)
+            square = (v0*v0 - 1) + (v2*v2 + v3*v3)
+        else
+            call short_direction(b, a, u, k*y, y, scd, m2, m1, b31, a23, v0, v2, v1)
+            call join_turns(-cosine, along, m3, m2, m1, v0, v2, v1, w3, w2, w1)
+            e0 = cosine*v0 + along*(m2*v2 + m1*v1)
+            square = (v0*v0 - 1) + (v2*v2 + v1*v1)
+        end if
+        select case (reach)
+        case (tiny_step)
+            call small_unit_turn(tiny_norm(square), w1, w2, w3, square)
+            w0 = tiny_scalar_part(square)
+        case (short_step)
+            call small_unit_turn(short_norm(square), w1, w2, w3, square)
+            w0 = short_scalar_part(square)
+        case default
+            call unit_turn(e0, w0, w1, w2, w3)
+        end select
+        q3 = body%parity*q(1 + i3)
+        call turn(w0, w1, w2, w3, q(1), q(1 + i1), q(1 + i2), q3)
+        q(1 + i3) = body%parity*q3
     end subroutine flow_one
 
     !> First terms of short_series: for max(p, r) <= tiny_limit the next are below 1e-17.
@@ -196,25 +193,50 @@ contains
                              + nu*(1/5.0_wp - e1*(2/21.0_wp) - nu*(1/7.0_wp)))
     end function tiny_third_kind
 
-    !> sin(x)/x and cos(x) - 1 from xx = x^2 <= tiny_turn_limit, to rounding.
-    pure subroutine tiny_turn(xx, sinc, cosm1)
+    !> sin(x)/x and cos(x) from xx = x^2 <= tiny_turn_limit, to rounding.
+    pure subroutine tiny_turn(xx, sinc, cosine)
         real(wp), intent(in) :: xx
-        real(wp), intent(out) :: sinc, cosm1
+        real(wp), intent(out) :: sinc, cosine
 
         sinc = 1 - xx*(1/6.0_wp - xx*(1/120.0_wp - xx*(1/5040.0_wp)))
-        cosm1 = -xx*(0.5_wp - xx*(1/24.0_wp - xx*(1/720.0_wp - xx*(1/40320.0_wp))))
+        cosine = 1 - xx*(0.5_wp - xx*(1/24.0_wp - xx*(1/720.0_wp - xx*(1/40320.0_wp))))
     end subroutine tiny_turn
 
-    !> sin(x)/x and cos(x) - 1 from xx = x^2 <= middle_turn_limit, to rounding.
-    pure subroutine middle_turn(xx, sinc, cosm1)
+    !> sin(x)/x and cos(x) from xx = x^2 <= middle_turn_limit, to rounding.
+    pure subroutine middle_turn(xx, sinc, cosine)
         real(wp), intent(in) :: xx
-        real(wp), intent(out) :: sinc, cosm1
+        real(wp), intent(out) :: sinc, cosine
 
-        sinc = 1 - xx*(1/6.0_wp - xx*(1/120.0_wp - xx*(1/5040.0_wp - xx*(1/362880.0_wp - xx*(1/39916800.0_wp &
-               - xx*(1/6227020800.0_wp - xx*(1/1307674368000.0_wp - xx*(1/355687428096000.0_wp))))))))
-        cosm1 = -xx*(0.5_wp - xx*(1/24.0_wp - xx*(1/720.0_wp - xx*(1/40320.0_wp - xx*(1/3628800.0_wp &
-                - xx*(1/479001600.0_wp - xx*(1/87178291200.0_wp - xx*(1/20922789888000.0_wp))))))))
+        real(wp) :: x4, x8
+
+        x4 = xx*xx
+        x8 = x4*x4
+        sinc = (((1 - xx*(1/6.0_wp)) + x4*(1/120.0_wp - xx*(1/5040.0_wp))) &
+                + x8*((1/362880.0_wp - xx*(1/39916800.0_wp)) &
+                      + x4*(1/6227020800.0_wp - xx*(1/1307674368000.0_wp)))) + (x8*x8)*(1/355687428096000.0_wp)
+        cosine = (((1 - xx*0.5_wp) + x4*(1/24.0_wp - xx*(1/720.0_wp))) &
+                  + x8*((1/40320.0_wp - xx*(1/3628800.0_wp)) &
+                        + x4*(1/479001600.0_wp - xx*(1/87178291200.0_wp)))) &
+                 + (x8*x8)*(1/20922789888000.0_wp)
     end subroutine middle_turn
+
+    !> First terms of short_norm.
+    pure function tiny_norm(square) result(change)
+        real(wp), intent(in) :: square
+        real(wp) :: change
+
+        change = -square*((0.5_wp - square*(3/8.0_wp)) + (square*square)*(5/16.0_wp - square*(35/128.0_wp)))
+    end function tiny_norm
+
+    !> First terms of short_scalar_part.
+    pure function tiny_scalar_part(square) result(w0)
+        real(wp), intent(in) :: square
+        real(wp) :: w0
+        real(wp) :: x2
+
+        x2 = square*square
+        w0 = -square*((0.5_wp + square*0.125_wp) + x2*((1/16.0_wp + square*(5/128.0_wp)) + x2*(7/256.0_wp)))
+    end function tiny_scalar_part
 
     !> flow_one for a body whose own axes are not principal: the momentum is taken to principal axes, and only
     !> the increments are taken back, so that no rounding of the rotation gathers over many steps.
@@ -253,109 +275,6 @@ contains
                  q(1)*w(2) + q(3)*w0 + (q(4)*w(1) - q(2)*w(3)), &
                  q(1)*w(3) + q(4)*w0 + (q(2)*w(2) - q(3)*w(1))]
     end subroutine flow_turned
-
-    !> A step of any length: increments d of m, z as the direction (v0; v2 on axis 2, v3 on axis 3 or 1), and
-    !> e = (1 + cosm1, angle m).
-    subroutine long_step(body, t, m1, m2, m3, with_attitude, d1, d2, d3, v0, v2, v3, cosm1, angle)
-        type(rigid_body), intent(in) :: body
-        real(wp), intent(in) :: t           !! h/2
-        real(wp), intent(in) :: m1, m2, m3  !! m in sorted axes
-        logical, intent(in) :: with_attitude
-        real(wp), intent(out) :: d1, d2, d3, v0, v2, v3, cosm1, angle
-        real(wp) :: a, b, g, x1, x2, x3, pt, rt, p, r, pmax, pmin, delta, nu, bg, norm
-        real(wp) :: fraction, turned, whole, f, span
-        real(wp) :: s, y, y1, c, d, cd, ec, es, n1, n2, n3, cp, dr, sine, cosine
-        logical :: cn_is_c, first_form
-        integer :: squares, triples
-
-        a = body%alpha*t
-        b = body%beta*t
-        g = body%gamma*t
-        x1 = m1*m1
-        x2 = m2*m2
-        x3 = m3*m3
-        pt = b*x1 + a*x2
-        rt = g*x2 + b*x3
-        p = g*pt
-        r = a*rt
-        delta = b*((a*x3) - (g*x1))     ! R - P; the parentheses keep it 0 on the separatrix with FMA
-        cn_is_c = delta <= 0.0_wp
-        delta = abs(delta)
-        pmax = max(p, r)
-        pmin = min(p, r)
-        first_form = g*rt <= a*pt
-        nu = merge(g*rt, a*pt, first_form)
-        norm = sqrt(x1 + x2 + x3)
-        bg = b*norm
-        fraction = 1.0_wp
-        whole = 0.0_wp
-        turned = 1.0_wp
-        if (pmax > period_limit) call reduce_periods(pmax, delta, nu, with_attitude, fraction, turned, whole)
-        f = abs(fraction)
-        squares = 0
-        triples = 0
-        span = fraction*fraction
-        do while (pmax*span > square_limit)
-            span = 0.25_wp*span
-            f = 0.5_wp*f
-            triples = triples + 1
-        end do
-        do while (pmax*span > base_limit)       ! nu <= pmax: the product of its two forms is p r
-            span = 0.25_wp*span
-            f = 0.5_wp*f
-            squares = squares + 1
-        end do
-        call base_series(p, r, f, s, y)
-        ec = 1.0_wp
-        es = 0.0_wp
-        if (with_attitude) call base_angle(p, r, nu, bg, s, y, ec, es)
-        do squares = squares, 1, -1
-            y1 = y
-            call double_square(p, r, y, s, cd)
-            if (with_attitude) call double_angle(nu, bg, y1, s, cd, ec, es)
-        end do
-        c = sqrt(1 - pmax*y)
-        d = sqrt(1 - pmin*y)
-        do triples = triples, 1, -1
-            y1 = s*s
-            call double_triple(pmax, delta, s, c, d)
-            if (with_attitude) call double_angle(nu, bg, y1, s, c*d, ec, es)
-        end do
-        s = sign(s, fraction)
-        es = sign(1.0_wp, fraction)*es
-        s = turned*s
-        c = turned*c
-        cp = merge(c, d, cn_is_c)
-        dr = merge(d, c, cn_is_c)
-        call long_momentum(cn_is_c, a, b, g, s, cp, dr, m1, m2, m3, body%parity, n1, n2, n3, d1, d2, d3)
-        v0 = 0.0_wp
-        v2 = 0.0_wp
-        v3 = 0.0_wp
-        cosm1 = 0.0_wp
-        angle = 0.0_wp
-        if (.not. with_attitude) return
-        if (first_form) then
-            v0 = dr
-            v2 = -g*s*dr*n2
-            v3 = -b*s*n3
-            angle = norm*(body%a(1)*t) - bg*nu*whole
-        else
-            v0 = cp
-            v2 = a*s*cp*n2
-            v3 = b*s*n1
-            angle = -(norm*(body%a(3)*t) + bg*nu*whole)
-        end if
-        if (abs(angle) <= sin_cos_limit) then
-            call sin_cos(angle, sine, cosine)
-        else
-            sine = sin(angle)
-            cosine = cos(angle)
-        end if
-        f = 1.5_wp - 0.5_wp*(ec*ec + es*es)     ! (ec, es) back to norm one, to first order
-        cosm1 = (cosine*ec + sine*es)*f - 1
-        angle = (sine*ec - cosine*es)*(f/norm)
-        if (.not. first_form) angle = -angle
-    end subroutine long_step
 
     !> The same flow with momentum, moments and time scaled by powers of 2 to the middle of the exponents; a
     !> time so long that no digit of any phase is left is cut to where the arithmetic holds.
@@ -406,6 +325,10 @@ contains
         m = scale(m, em)
     end subroutine flow_rescaled
 
-    include 'flow_formulas.inc'
+    include 'short_formulas.inc'
+
+    include 'middle_formulas.inc'
+
+    include 'turn_formulas.inc'
 
 end module frb_flow_one
