@@ -36,7 +36,7 @@ contains
             error(2) = max(error(2), abs(y - sum(y_terms(:5))))
             error(3) = max(error(3), abs(scd - sum([((k + 1)*y_terms(k), k=0, 5)])))
             error(4) = max(error(4), abs(middle_third_kind(p, r, n) - third_kind(p, r, n, 7)))
-            error(5) = max(error(5), abs(short_third_kind(p, r, n) - third_kind(p, r, n, 4)))
+            error(5) = max(error(5), abs(short_third_kind(p, r, n, 1.0_wp) - third_kind(p, r, n, 4)))
             ! s at t = 1/16 from its series, to 1e-34, doubled twice in each way to t = 1/4.
             call triple_series(p/256, r/256, s_terms)
             s = sum(s_terms)/16

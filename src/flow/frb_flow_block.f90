@@ -3,7 +3,7 @@
 !> its block, so results are the same for any split of the bodies. A body that is out of reach (many periods
 !> in one step, extreme exponents, refused input) is left to the routine for one body.
 module frb_flow_block
-    use frb_flow_limits, only: short_limit, small_turn_limit, middle_limit, square_limit, period_limit, &
+    use frb_flow_limits, only: tiny_limit, short_limit, small_turn_limit, middle_limit, square_limit, period_limit, &
         smallest_denominator, sin_cos_limit
     use frb_kinds, only: wp
     implicit none
@@ -26,6 +26,7 @@ module frb_flow_block
         real(wp) :: a(lanes), b(lanes), g(lanes), p(lanes), r(lanes), nu(lanes)
         real(wp) :: form(lanes)                                     !! 1: first form, -1: its mirror image
         real(wp) :: long(lanes)                                     !! 1: beyond the short series, else 0
+        real(wp) :: y(lanes), scd(lanes), third(lanes)              !! s^2, s c d, H of short steps
         real(wp) :: d1(lanes), d2(lanes), d3(lanes)                 !! increments of the momentum
         real(wp) :: w0(lanes), w1(lanes), w2(lanes), w3(lanes)      !! the turn e z - 1
     end type workspace
@@ -40,9 +41,10 @@ contains
         logical, intent(in) :: with_attitude
         type(workspace) :: work
         real(wp) :: square, y2, y3
-        integer :: l, reached, resting, many_long
+        integer :: l, reached, resting, many_short, many_long
 
         many_long = 0
+        many_short = 0
         resting = 0
         do l = 1, lanes
             work%a(l) = bodies%alpha(l)*t
@@ -67,9 +69,12 @@ contains
                                  max(work%p(l), work%r(l)) > short_limit .or. square > small_turn_limit)
             work%long(l) = merge(work%long(l), 0.0_wp, bodies%served(l) == 1)
             many_long = many_long + merge(1, 0, work%long(l) > 0.0_wp)
+            many_short = many_short + merge(1, 0, max(work%p(l), work%r(l)) > tiny_limit)
         end do
         if (resting > 0) call rest_lanes(bodies, work)
         ! Short and long lanes in one block: each loop runs over all lanes, each lane takes its own result.
+        call tiny_triple(with_attitude, work)
+        if (many_short > 0) call short_triple(with_attitude, work)
         call short_steps(bodies, t, with_attitude, work)
         if (many_long > 0) call long_steps(bodies, t, with_attitude, work)
         if (with_attitude) then
@@ -103,14 +108,49 @@ contains
         end do
     end subroutine rest_lanes
 
-    !> Short steps: increments of m; the turn when `with_attitude`. Lanes that the short series do not reach
-    !> run along with p = r = 0.
+    !> The triple and the integral of the third kind by the first terms of their series. Lanes that the short
+    !> series do not reach run along with p = r = nu = 0, here and in the next two routines.
+    subroutine tiny_triple(with_attitude, work)
+        logical, intent(in) :: with_attitude
+        type(workspace), intent(inout) :: work
+        real(wp) :: p, r
+        integer :: l
+
+        do l = 1, lanes
+            p = merge(work%p(l), 0.0_wp, work%long(l) <= 0.0_wp)
+            r = merge(work%r(l), 0.0_wp, work%long(l) <= 0.0_wp)
+            call tiny_series(p + r, p*r, work%y(l), work%scd(l))
+            if (with_attitude) work%third(l) = tiny_third_kind(p + r, p*r, work%nu(l))
+        end do
+    end subroutine tiny_triple
+
+    !> The same with all terms, for lanes beyond the first ones.
+    subroutine short_triple(with_attitude, work)
+        logical, intent(in) :: with_attitude
+        type(workspace), intent(inout) :: work
+        real(wp) :: p, r, y, scd, third
+        integer :: l
+
+        do l = 1, lanes
+            p = merge(work%p(l), 0.0_wp, work%long(l) <= 0.0_wp)
+            r = merge(work%r(l), 0.0_wp, work%long(l) <= 0.0_wp)
+            call short_series(p + r, p*r, y, scd)
+            work%y(l) = merge(work%y(l), y, max(p, r) <= tiny_limit)
+            work%scd(l) = merge(work%scd(l), scd, max(p, r) <= tiny_limit)
+            if (with_attitude) then
+                third = short_third_kind(p*y, r*y, work%nu(l), y)
+                work%third(l) = merge(work%third(l), third, max(p, r) <= tiny_limit)
+            end if
+        end do
+    end subroutine short_triple
+
+    !> Short steps: increments of m; the turn when `with_attitude`.
     subroutine short_steps(bodies, t, with_attitude, work)
         type(block_of_bodies), intent(in) :: bodies
         real(wp), intent(in) :: t
         logical, intent(in) :: with_attitude
         type(workspace), intent(inout) :: work
-        real(wp) :: p, r, y, scd, u, w, k, k0, a23, b31, g12, form, first, last, n
+        real(wp) :: y, scd, u, w, k, k0, a23, b31, g12, form, first, last
         real(wp) :: v0, v2, v3, angle, along, cosine, square, w1, w2, w3
         integer :: l
 
@@ -118,11 +158,10 @@ contains
             a23 = work%a(l)*(work%m2(l)*work%m3(l))
             b31 = work%b(l)*(work%m3(l)*work%m1(l))
             g12 = work%g(l)*(work%m1(l)*work%m2(l))
-            p = merge(work%p(l), 0.0_wp, work%long(l) <= 0.0_wp)
-            r = merge(work%r(l), 0.0_wp, work%long(l) <= 0.0_wp)
-            call short_series(p + r, p*r, y, scd)
-            u = p*y
-            w = r*y
+            y = work%y(l)
+            scd = work%scd(l)
+            u = merge(work%p(l)*y, 0.0_wp, work%long(l) <= 0.0_wp)
+            w = merge(work%r(l)*y, 0.0_wp, work%long(l) <= 0.0_wp)
             k0 = merge(work%a(l)*work%g(l)*work%m2(l)**2, 0.0_wp, work%long(l) <= 0.0_wp)
             k = k0*y
             call short_momentum(u, w, k0*(scd*scd), scd, work%m1(l), work%m2(l), work%m3(l), a23, b31, &
@@ -130,11 +169,10 @@ contains
             if (with_attitude) then
                 ! The mirror form is the first one with the axes (3, 2, 1).
                 form = work%form(l)
-                n = merge(work%nu(l)*y, 0.0_wp, work%long(l) <= 0.0_wp)
                 first = merge(work%m1(l), work%m3(l), form > 0.0_wp)
                 last = merge(work%m3(l), work%m1(l), form > 0.0_wp)
                 angle = merge(bodies%a1(l), bodies%a3(l), form > 0.0_wp)*t &
-                        - form*work%b(l)*n*sqrt(y)*short_third_kind(u, w, n)
+                        - form*work%b(l)*(work%nu(l)*work%third(l))
                 call small_turn(angle*angle*work%gg(l), along, cosine)
                 call short_direction(work%b(l), merge(work%g(l), work%a(l), form > 0.0_wp), &
                                      merge(w, u, form > 0.0_wp), k, y, scd, work%m2(l), last, b31, &

@@ -142,7 +142,7 @@ contains
             angle = angle + twist*tiny_third_kind(p + r, p*r, nu)
             call tiny_turn(angle*angle*gg, along, cosine)
         case (short_step)
-            angle = angle + twist*y*sqrt(y)*short_third_kind(u, w, nu*y)
+            angle = angle + twist*short_third_kind(u, w, nu, y)
             call small_turn(angle*angle*gg, along, cosine)
         case default
             angle = angle + twist*y*sqrt(y)*middle_third_kind(u, w, nu*y)
@@ -174,24 +174,6 @@ contains
         call turn(w0, w1, w2, w3, q(1), q(1 + i1), q(1 + i2), q3)
         q(1 + i3) = body%parity*q3
     end subroutine flow_one
-
-    !> First terms of short_series: for max(p, r) <= tiny_limit the next are below 1e-17.
-    pure subroutine tiny_series(e1, e2, y, scd)
-        real(wp), intent(in) :: e1, e2
-        real(wp), intent(out) :: y, scd
-
-        y = 1 - e1*(1/3.0_wp - e1*(2/45.0_wp - e1*(1/315.0_wp))) + e2*(1/5.0_wp - e1*(3/35.0_wp))
-        scd = 1 - e1*(2/3.0_wp - e1*(2/15.0_wp - e1*(4/315.0_wp))) + e2*(3/5.0_wp - e1*(12/35.0_wp))
-    end subroutine tiny_series
-
-    !> H in units of t^3 from the first terms of y in t: the integral of y/(1 + nu y).
-    pure function tiny_third_kind(e1, e2, nu) result(series)
-        real(wp), intent(in) :: e1, e2, nu
-        real(wp) :: series
-
-        series = 1/3.0_wp - (e1*(1/15.0_wp - e1*(2/315.0_wp)) - e2*(1/35.0_wp) &
-                             + nu*(1/5.0_wp - e1*(2/21.0_wp) - nu*(1/7.0_wp)))
-    end function tiny_third_kind
 
     !> sin(x)/x and cos(x) from xx = x^2 <= tiny_turn_limit, to rounding.
     pure subroutine tiny_turn(xx, sinc, cosine)
