@@ -144,47 +144,58 @@ contains
         end do
     end subroutine short_triple
 
-    !> Short steps: increments of m; the turn when `with_attitude`.
+    !> Short steps: increments of m; the turn when `with_attitude`. Several small loops: the processor then works
+    !> on all vectors of a block at a time, and constants stay in registers.
     subroutine short_steps(bodies, t, with_attitude, work)
         type(block_of_bodies), intent(in) :: bodies
         real(wp), intent(in) :: t
         logical, intent(in) :: with_attitude
         type(workspace), intent(inout) :: work
-        real(wp) :: y, scd, u, w, k, k0, a23, b31, g12, form, first, last
-        real(wp) :: v0, v2, v3, angle, along, cosine, square, w1, w2, w3
+        real(wp) :: k0(lanes), u(lanes), w(lanes), along(lanes), cosine(lanes), first(lanes), last(lanes)
+        real(wp) :: w1(lanes), w2(lanes), w3(lanes), square(lanes), a23(lanes), b31(lanes), g12(lanes)
+        real(wp) :: v0, v2, v3, angle
         integer :: l
 
         do l = 1, lanes
-            a23 = work%a(l)*(work%m2(l)*work%m3(l))
-            b31 = work%b(l)*(work%m3(l)*work%m1(l))
-            g12 = work%g(l)*(work%m1(l)*work%m2(l))
-            y = work%y(l)
-            scd = work%scd(l)
-            u = merge(work%p(l)*y, 0.0_wp, work%long(l) <= 0.0_wp)
-            w = merge(work%r(l)*y, 0.0_wp, work%long(l) <= 0.0_wp)
-            k0 = merge(work%a(l)*work%g(l)*work%m2(l)**2, 0.0_wp, work%long(l) <= 0.0_wp)
-            k = k0*y
-            call short_momentum(u, w, k0*(scd*scd), scd, work%m1(l), work%m2(l), work%m3(l), a23, b31, &
-                                g12, work%d1(l), work%d2(l), work%d3(l))
-            if (with_attitude) then
-                ! The mirror form is the first one with the axes (3, 2, 1).
-                form = work%form(l)
-                first = merge(work%m1(l), work%m3(l), form > 0.0_wp)
-                last = merge(work%m3(l), work%m1(l), form > 0.0_wp)
-                angle = merge(bodies%a1(l), bodies%a3(l), form > 0.0_wp)*t &
-                        - form*work%b(l)*(work%nu(l)*work%third(l))
-                call small_turn(angle*angle*work%gg(l), along, cosine)
-                call short_direction(work%b(l), merge(work%g(l), work%a(l), form > 0.0_wp), &
-                                     merge(w, u, form > 0.0_wp), k, y, scd, work%m2(l), last, b31, &
-                                     merge(g12, a23, form > 0.0_wp), v0, v2, v3)
-                call join_turns(form*cosine, angle*along, first, work%m2(l), last, v0, v2, v3, w1, w2, w3)
-                square = (v0*v0 - 1) + (v2*v2 + v3*v3)
-                call small_unit_turn(short_norm(square), w1, w2, w3, square)
-                work%w0(l) = short_scalar_part(square)
-                work%w1(l) = merge(w1, w3, form > 0.0_wp)
-                work%w2(l) = w2
-                work%w3(l) = merge(w3, w1, form > 0.0_wp)
-            end if
+            a23(l) = work%a(l)*(work%m2(l)*work%m3(l))
+            b31(l) = work%b(l)*(work%m3(l)*work%m1(l))
+            g12(l) = work%g(l)*(work%m1(l)*work%m2(l))
+            u(l) = merge(work%p(l)*work%y(l), 0.0_wp, work%long(l) <= 0.0_wp)
+            w(l) = merge(work%r(l)*work%y(l), 0.0_wp, work%long(l) <= 0.0_wp)
+            k0(l) = merge(work%a(l)*work%g(l)*work%m2(l)**2, 0.0_wp, work%long(l) <= 0.0_wp)
+        end do
+        do l = 1, lanes
+            call short_momentum(u(l), w(l), k0(l)*(work%scd(l)*work%scd(l)), work%scd(l), &
+                                work%m1(l), work%m2(l), work%m3(l), a23(l), b31(l), g12(l), &
+                                work%d1(l), work%d2(l), work%d3(l))
+        end do
+        if (.not. with_attitude) return
+        do l = 1, lanes
+            angle = merge(bodies%a1(l), bodies%a3(l), work%form(l) > 0.0_wp)*t &
+                    - work%form(l)*work%b(l)*(work%nu(l)*work%third(l))
+            call small_turn(angle*angle*work%gg(l), along(l), cosine(l))
+            along(l) = angle*along(l)
+        end do
+        ! The mirror form is the first one with the axes (3, 2, 1).
+        do l = 1, lanes
+            first(l) = merge(work%m1(l), work%m3(l), work%form(l) > 0.0_wp)
+            last(l) = merge(work%m3(l), work%m1(l), work%form(l) > 0.0_wp)
+            call short_direction(work%b(l), merge(work%g(l), work%a(l), work%form(l) > 0.0_wp), &
+                                 merge(w(l), u(l), work%form(l) > 0.0_wp), k0(l)*work%y(l), work%y(l), &
+                                 work%scd(l), work%m2(l), last(l), b31(l), &
+                                 merge(g12(l), a23(l), work%form(l) > 0.0_wp), v0, v2, v3)
+            call join_turns(work%form(l)*cosine(l), along(l), first(l), work%m2(l), last(l), v0, v2, v3, &
+                            w1(l), w2(l), w3(l))
+            square(l) = (v0*v0 - 1) + (v2*v2 + v3*v3)
+        end do
+        do l = 1, lanes
+            call small_unit_turn(short_norm(square(l)), w1(l), w2(l), w3(l), square(l))
+            work%w1(l) = merge(w1(l), w3(l), work%form(l) > 0.0_wp)
+            work%w2(l) = w2(l)
+            work%w3(l) = merge(w3(l), w1(l), work%form(l) > 0.0_wp)
+        end do
+        do l = 1, lanes
+            work%w0(l) = short_scalar_part(square(l))
         end do
     end subroutine short_steps
 

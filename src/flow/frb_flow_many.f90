@@ -7,6 +7,7 @@ module frb_flow_many
     use frb_kinds, only: wp
     use frb_status, only: status_ok, status_bad_time
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+    use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
@@ -25,16 +26,30 @@ contains
         real(wp), intent(inout), optional :: q(4, n)
         type(block_of_bodies) :: block
         integer :: first, last, one, count, refused
+        logical :: equal, served
 
         code = status_ok
         if (bodies == 1) code = body(1)%status
         if (code == status_ok .and. .not. ieee_is_finite(h)) code = status_bad_time
         if (code /= status_ok) return
         refused = status_ok
-        !$omp parallel do if (n >= 64*lanes) private(block, last, one, count) reduction(max: refused)
+        equal = .false.
+        if (bodies == 1) equal = .not. body(1)%turned .and. is_plain_time(body(1), h)
+        if (equal) call set_body(body(1), block)
+        !$omp parallel do if (n >= 64*lanes) firstprivate(block) private(last, one, count, served) &
+        !$omp& reduction(max: refused)
         do first = 1, n, lanes
             last = min(first + lanes - 1, n)
             count = last - first + 1
+            if (equal .and. count == lanes) then
+                ! The usual case: whole blocks of one body; what is not plain goes the other way.
+                if (present(q)) then
+                    call flow_whole(body, h, block, m(1, first), served, refused, q(1, first))
+                else
+                    call flow_whole(body, h, block, m(1, first), served, refused)
+                end if
+                if (served) cycle
+            end if
             one = merge(1, count, bodies == 1)
             associate (body_1 => body(merge(1, first, bodies == 1):merge(1, last, bodies == 1)))
                 if (present(q)) then
@@ -47,10 +62,107 @@ contains
                     call store_block(body_1, one, count, h, block, m(1, first), refused)
                 end if
             end associate
+            if (equal) call set_body(body(1), block)
         end do
         !$omp end parallel do
         code = refused
     end subroutine flow_many
+
+    !> The same body into all lanes.
+    pure subroutine set_body(body, bodies)
+        type(rigid_body), intent(in) :: body
+        type(block_of_bodies), intent(inout) :: bodies
+
+        bodies%alpha = body%alpha
+        bodies%beta = body%beta
+        bodies%gamma = body%gamma
+        bodies%a1 = body%a(1)
+        bodies%a3 = body%a(3)
+    end subroutine set_body
+
+    !> Advances `lanes` equal bodies if all are plain; else, served = .false., they are left as they are.
+    subroutine flow_whole(body, h, bodies, m, served, refused, q)
+        type(rigid_body), intent(in) :: body(1)             !! in its principal axes, plain in the time h
+        real(wp), intent(in) :: h
+        type(block_of_bodies), intent(inout) :: bodies      !! with the body in all lanes
+        real(wp), intent(inout) :: m(3, lanes)
+        logical, intent(out) :: served
+        integer, intent(inout) :: refused
+        real(wp), intent(inout), optional :: q(4, lanes)
+        integer :: l, i1, i2, i3
+
+        ! Column of axis j in the block: the inverse of the sorting.
+        i1 = findloc_of(body(1)%order, 1)
+        i2 = findloc_of(body(1)%order, 2)
+        i3 = findloc_of(body(1)%order, 3)
+        do l = 1, lanes
+            bodies%m(l, i1) = m(1, l)
+            bodies%m(l, i2) = m(2, l)
+            bodies%m(l, i3) = m(3, l)
+        end do
+        served = all_plain(bodies%m(:, 1), bodies%m(:, 2), bodies%m(:, 3))
+        if (served .and. present(q)) then
+            do l = 1, lanes
+                bodies%q(l, 0) = q(1, l)
+                bodies%q(l, i1) = q(2, l)
+                bodies%q(l, i2) = q(3, l)
+                bodies%q(l, i3) = q(4, l)
+            end do
+            served = all_plain(bodies%q(:, 0), bodies%q(:, 1), bodies%q(:, 2), bodies%q(:, 3))
+        end if
+        if (.not. served) return
+        bodies%served = 1
+        if (body(1)%parity < 0.0_wp) call reflect(bodies)
+        call flow_block(bodies, 0.5_wp*h, present(q))
+        if (any(bodies%served == 0)) then
+            call store_block(body, 1, lanes, h, bodies, m, refused, q)
+            return
+        end if
+        if (body(1)%parity < 0.0_wp) call reflect(bodies)
+        do l = 1, lanes
+            m(1, l) = bodies%m(l, i1)
+            m(2, l) = bodies%m(l, i2)
+            m(3, l) = bodies%m(l, i3)
+        end do
+        if (.not. present(q)) return
+        do l = 1, lanes
+            q(1, l) = bodies%q(l, 0)
+            q(2, l) = bodies%q(l, i1)
+            q(3, l) = bodies%q(l, i2)
+            q(4, l) = bodies%q(l, i3)
+        end do
+    end subroutine flow_whole
+
+    !> To and from sorted axes that are right-handed: an odd sorting turns the last axis round.
+    pure subroutine reflect(bodies)
+        type(block_of_bodies), intent(inout) :: bodies
+
+        bodies%m(:, 3) = -bodies%m(:, 3)
+        bodies%q(:, 3) = -bodies%q(:, 3)
+    end subroutine reflect
+
+    !> Whether all vectors (x1, x2, x3, x4) hold plain numbers. The bits of a number without its sign are
+    !> ordered as its size is, with Inf and NaN above all; comparing them raises no exception.
+    pure function all_plain(x1, x2, x3, x4) result(plain)
+        real(wp), intent(in) :: x1(lanes), x2(lanes), x3(lanes)
+        real(wp), intent(in), optional :: x4(lanes)
+        logical :: plain
+        integer(int64), parameter :: without_sign = huge(0_int64)
+        integer(int64) :: largest, smallest, size
+        integer :: l
+
+        largest = 0_int64
+        smallest = huge(0_int64)
+        do l = 1, lanes
+            size = max(iand(transfer(x1(l), 0_int64), without_sign), &
+                       iand(transfer(x2(l), 0_int64), without_sign), &
+                       iand(transfer(x3(l), 0_int64), without_sign))
+            if (present(x4)) size = max(size, iand(transfer(x4(l), 0_int64), without_sign))
+            largest = max(largest, size)
+            smallest = min(smallest, size)
+        end do
+        plain = largest < transfer(plain_largest, 0_int64) .and. smallest > transfer(plain_smallest, 0_int64)
+    end function all_plain
 
     !> Bodies first to last into the lanes of a block, in sorted axes; lanes that hold no plain state rest.
     subroutine load_block(body, different, count, h, m, bodies, q)
@@ -60,110 +172,36 @@ contains
         real(wp), intent(in) :: m(3, count)
         type(block_of_bodies), intent(out) :: bodies
         real(wp), intent(in), optional :: q(4, count)
-        real(wp) :: parity
-        integer :: l, i1, i2, i3
+        integer :: l
 
-        if (count < lanes) then
-            bodies%m = 0.0_wp
-            bodies%q = 0.0_wp
-        end if
+        bodies%m = 0.0_wp
+        bodies%q = 0.0_wp
+        bodies%alpha = 0.0_wp
+        bodies%beta = 0.0_wp
+        bodies%gamma = 0.0_wp
+        bodies%a1 = 0.0_wp
+        bodies%a3 = 0.0_wp
         bodies%served = 0
-        if (different == 1) then
-            bodies%alpha = body(1)%alpha
-            bodies%beta = body(1)%beta
-            bodies%gamma = body(1)%gamma
-            bodies%a1 = body(1)%a(1)
-            bodies%a3 = body(1)%a(3)
-            ! Column of axis j in the block: the inverse of the sorting.
-            i1 = findloc_of(body(1)%order, 1)
-            i2 = findloc_of(body(1)%order, 2)
-            i3 = findloc_of(body(1)%order, 3)
-            parity = body(1)%parity
-            do l = 1, count
-                bodies%m(l, i1) = parity*m(1, l)
-                bodies%m(l, i2) = parity*m(2, l)
-                bodies%m(l, i3) = parity*m(3, l)
-            end do
-            if (present(q)) then
-                do l = 1, count
-                    bodies%q(l, 0) = q(1, l)
-                    bodies%q(l, i1) = parity*q(2, l)
-                    bodies%q(l, i2) = parity*q(3, l)
-                    bodies%q(l, i3) = parity*q(4, l)
-                end do
-            end if
-        else
-            bodies%alpha = 0.0_wp
-            bodies%beta = 0.0_wp
-            bodies%gamma = 0.0_wp
-            bodies%a1 = 0.0_wp
-            bodies%a3 = 0.0_wp
-            do l = 1, count
-                bodies%alpha(l) = body(l)%alpha
-                bodies%beta(l) = body(l)%beta
-                bodies%gamma(l) = body(l)%gamma
-                bodies%a1(l) = body(l)%a(1)
-                bodies%a3(l) = body(l)%a(3)
-                bodies%m(l, :) = body(l)%parity*m(body(l)%order, l)
-                if (present(q)) then
-                    bodies%q(l, 0) = q(1, l)
-                    bodies%q(l, 1:3) = body(l)%parity*q(1 + body(l)%order, l)
-                end if
-            end do
-        end if
-        if (different == 1 .and. count == lanes) then
-            if (all_plain(body(1), h, bodies, present(q))) then
-                bodies%served = 1
-                return
-            end if
-        end if
         do l = 1, count
-            if (lane_is_plain(body(min(l, different)), h, bodies, l, present(q))) then
-                bodies%served(l) = 1
-            else
-                bodies%m(l, :) = 0.0_wp
-                bodies%q(l, :) = 0.0_wp
-                bodies%alpha(l) = 0.0_wp
-                bodies%beta(l) = 0.0_wp
-                bodies%gamma(l) = 0.0_wp
-                bodies%a1(l) = 0.0_wp
-                bodies%a3(l) = 0.0_wp
-            end if
+            associate (one => body(min(l, different)))
+                bodies%m(l, :) = m(one%order, l)
+                if (present(q)) bodies%q(l, :) = [q(1, l), q(1 + one%order, l)]
+                if (lane_is_plain(one, h, bodies, l, present(q))) then
+                    bodies%served(l) = 1
+                    bodies%alpha(l) = one%alpha
+                    bodies%beta(l) = one%beta
+                    bodies%gamma(l) = one%gamma
+                    bodies%a1(l) = one%a(1)
+                    bodies%a3(l) = one%a(3)
+                    bodies%m(l, 3) = one%parity*bodies%m(l, 3)
+                    bodies%q(l, 3) = one%parity*bodies%q(l, 3)
+                else
+                    bodies%m(l, :) = 0.0_wp
+                    bodies%q(l, :) = 0.0_wp
+                end if
+            end associate
         end do
     end subroutine load_block
-
-    !> Whether all lanes of equal bodies hold plain numbers: a test without branches for the usual case.
-    pure function all_plain(body, h, bodies, with_attitude) result(plain)
-        type(rigid_body), intent(in) :: body
-        real(wp), intent(in) :: h
-        type(block_of_bodies), intent(in) :: bodies
-        logical, intent(in) :: with_attitude
-        logical :: plain
-        integer, parameter :: width = 8
-        real(wp) :: size_m(lanes), size_q(lanes), total(width)
-        integer :: l, outside
-
-        plain = .false.
-        if (body%turned) return
-        if (.not. is_plain_time(body, h)) return
-        size_m = 0.01_wp*abs(bodies%m(:, 1)) + 0.01_wp*abs(bodies%m(:, 2)) + 0.01_wp*abs(bodies%m(:, 3))
-        size_q = 1.0_wp
-        if (with_attitude) size_q = 0.01_wp*abs(bodies%q(:, 0)) + 0.01_wp*abs(bodies%q(:, 1)) &
-            + 0.01_wp*abs(bodies%q(:, 2)) + 0.01_wp*abs(bodies%q(:, 3))
-        ! A NaN or Inf anywhere shows in the sum; numbers are compared only when there is none.
-        total = 0.0_wp
-        do l = 1, lanes, width
-            total = total + size_m(l:l + width - 1) + size_q(l:l + width - 1)
-        end do
-        plain = all(ieee_is_finite(total))
-        if (.not. plain) return
-        outside = 0
-        do l = 1, lanes
-            outside = outside + merge(1, 0, size_m(l) >= plain_largest .or. size_m(l) <= plain_smallest &
-                                      .or. size_q(l) >= plain_largest .or. size_q(l) <= plain_smallest)
-        end do
-        plain = outside == 0
-    end function all_plain
 
     !> Whether angles that the body turns in the time h stay far from overflow.
     pure function is_plain_time(body, h) result(plain)
@@ -207,36 +245,15 @@ contains
         real(wp), intent(inout) :: m(3, count)
         integer, intent(inout) :: refused
         real(wp), intent(inout), optional :: q(4, count)
-        real(wp) :: parity
-        integer :: l, i1, i2, i3, code
+        integer :: l, code
 
-        if (different == 1 .and. all(bodies%served(1:count) == 1)) then
-            i1 = findloc_of(body(1)%order, 1)
-            i2 = findloc_of(body(1)%order, 2)
-            i3 = findloc_of(body(1)%order, 3)
-            parity = body(1)%parity
-            do l = 1, count
-                m(1, l) = parity*bodies%m(l, i1)
-                m(2, l) = parity*bodies%m(l, i2)
-                m(3, l) = parity*bodies%m(l, i3)
-            end do
-            if (present(q)) then
-                do l = 1, count
-                    q(1, l) = bodies%q(l, 0)
-                    q(2, l) = parity*bodies%q(l, i1)
-                    q(3, l) = parity*bodies%q(l, i2)
-                    q(4, l) = parity*bodies%q(l, i3)
-                end do
-            end if
-            return
-        end if
         do l = 1, count
             associate (one => body(min(l, different)))
                 if (bodies%served(l) == 1) then
-                    m(one%order, l) = one%parity*bodies%m(l, :)
+                    m(one%order, l) = [bodies%m(l, 1), bodies%m(l, 2), one%parity*bodies%m(l, 3)]
                     if (present(q)) then
                         q(1, l) = bodies%q(l, 0)
-                        q(1 + one%order, l) = one%parity*bodies%q(l, 1:3)
+                        q(1 + one%order, l) = [bodies%q(l, 1), bodies%q(l, 2), one%parity*bodies%q(l, 3)]
                     end if
                 else if (present(q)) then
                     call flow_body(one, h, m(:, l), code, q(:, l))
