@@ -303,7 +303,9 @@ contains
                 s(l) = s(l)*n
                 c(l) = c(l)*n
                 d(l) = d(l)*n
-                ec(l) = merge(ec(l)/(abs(ec(l)) + abs(es(l))), ec(l), z(l) < smallest_denominator)
+                n = merge(1/(abs(ec(l)) + abs(es(l))), 1.0_wp, z(l) < smallest_denominator)
+                ec(l) = ec(l)*n
+                es(l) = es(l)*n
                 z(l) = merge(1.0_wp, z(l), z(l) < smallest_denominator)
             end do
         end do

@@ -22,8 +22,8 @@ contains
         real(wp), intent(out) :: period, mean
         integer, parameter :: most = 20                     ! the mean of 1 and 1e-308 needs 14
         real(wp), parameter :: negligible = 1.0e-17_wp      ! bound of the next term: e_(j+1) < e_j^2
-        real(wp), parameter :: close_for_series = 0.08_wp   ! x^14 of the series is then below rounding
-        real(wp) :: a, g, p, ag, pp, e, q, sum_q, x2
+        real(wp), parameter :: close_for_series = 0.25_wp   ! x^26 of the series is then below rounding
+        real(wp) :: a, g, p, ag, pp, e, q, sum_q, x2, x4, x8
         logical :: found
         integer :: j
 
@@ -37,11 +37,17 @@ contains
         mean = 0.0_wp
         do j = 1, most
             if (.not. found .and. a - g <= close_for_series*(a + g)) then
-                ! agm(1 + x, 1 - x) = pi/(2 K(x)), K(x) = (pi/2) (1 + x^2/4 + 9 x^4/64 + ...)
+                ! agm(1 + x, 1 - x) = pi/(2 K(x)), K(x) = (pi/2) sum ((2n - 1)!!/(2n)!!)^2 x^(2n)
                 found = .true.
                 x2 = ((a - g)/(a + g))**2
-                period = (pi/(a + g))*((1 + x2*(1/4.0_wp)) + (x2*x2)*((9/64.0_wp + x2*(25/256.0_wp)) &
-                         + (x2*x2)*((1225/16384.0_wp + x2*(3969/65536.0_wp)) + (x2*x2)*(53361/1048576.0_wp))))
+                x4 = x2*x2
+                x8 = x4*x4
+                period = (pi/(a + g))*((((1 + x2*(1/4.0_wp)) + x4*((3/8.0_wp)**2 + x2*(5/16.0_wp)**2)) &
+                                        + x8*(((35/128.0_wp)**2 + x2*(63/256.0_wp)**2) &
+                                              + x4*((231/1024.0_wp)**2 + x2*(429/2048.0_wp)**2))) &
+                                       + (x8*x8)*((((6435/32768.0_wp)**2 + x2*(12155/65536.0_wp)**2) &
+                                                   + x4*((46189/262144.0_wp)**2 + x2*(88179/524288.0_wp)**2)) &
+                                                  + x8*(676039/4194304.0_wp)**2))
             end if
             if (found .and. .not. with_mean) return
             ag = a*g
