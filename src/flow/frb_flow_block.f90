@@ -138,7 +138,7 @@ contains
             work%y(l) = merge(work%y(l), y, max(p, r) <= tiny_limit)
             work%scd(l) = merge(work%scd(l), scd, max(p, r) <= tiny_limit)
             if (with_attitude) then
-                third = short_third_kind(p*y, r*y, work%nu(l), y)
+                third = short_third_kind(p + r, p*r, work%nu(l))
                 work%third(l) = merge(work%third(l), third, max(p, r) <= tiny_limit)
             end if
         end do

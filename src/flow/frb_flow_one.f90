@@ -142,7 +142,7 @@ contains
             angle = angle + twist*tiny_third_kind(p + r, p*r, nu)
             call tiny_turn(angle*angle*gg, along, cosine)
         case (short_step)
-            angle = angle + twist*short_third_kind(u, w, nu, y)
+            angle = angle + twist*short_third_kind(p + r, p*r, nu)
             call small_turn(angle*angle*gg, along, cosine)
         case default
             angle = angle + twist*y*sqrt(y)*middle_third_kind(u, w, nu*y)
