@@ -5,7 +5,7 @@ module frb_quad_flow_formulas
     private
 
     public :: wp, short_series, short_momentum, short_direction, short_third_kind, small_turn, short_norm
-    public :: small_unit_turn, short_scalar_part, middle_series, middle_third_kind, double_square, double_triple
+    public :: small_unit_turn, middle_series, middle_third_kind, double_square, double_triple
     public :: base_angle, double_angle, long_momentum, long_direction, sin_cos, join_turns, turn, unit_turn
 
 contains

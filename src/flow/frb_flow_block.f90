@@ -151,9 +151,9 @@ contains
         real(wp), intent(in) :: t
         logical, intent(in) :: with_attitude
         type(workspace), intent(inout) :: work
-        real(wp) :: k0(lanes), u(lanes), w(lanes), along(lanes), cosine(lanes), first(lanes), last(lanes)
-        real(wp) :: w1(lanes), w2(lanes), w3(lanes), square(lanes), a23(lanes), b31(lanes), g12(lanes)
-        real(wp) :: v0, v2, v3, angle
+        real(wp) :: k0(lanes), u(lanes), w(lanes), along(lanes), cosm1(lanes), first(lanes), last(lanes)
+        real(wp) :: w1(lanes), w2(lanes), w3(lanes), square(lanes), dot(lanes), v0(lanes), a23(lanes), b31(lanes), g12(lanes)
+        real(wp) :: v2, v3, angle
         integer :: l
 
         do l = 1, lanes
@@ -173,7 +173,7 @@ contains
         do l = 1, lanes
             angle = merge(bodies%a1(l), bodies%a3(l), work%form(l) > 0.0_wp)*t &
                     - work%form(l)*work%b(l)*(work%nu(l)*work%third(l))
-            call small_turn(angle*angle*work%gg(l), along(l), cosine(l))
+            call small_turn(angle*angle*work%gg(l), along(l), cosm1(l))
             along(l) = angle*along(l)
         end do
         ! The mirror form is the first one with the axes (3, 2, 1).
@@ -183,19 +183,17 @@ contains
             call short_direction(work%b(l), merge(work%g(l), work%a(l), work%form(l) > 0.0_wp), &
                                  merge(w(l), u(l), work%form(l) > 0.0_wp), k0(l)*work%y(l), work%y(l), &
                                  work%scd(l), work%m2(l), last(l), b31(l), &
-                                 merge(g12(l), a23(l), work%form(l) > 0.0_wp), v0, v2, v3)
-            call join_turns(work%form(l)*cosine(l), along(l), first(l), work%m2(l), last(l), v0, v2, v3, &
-                            w1(l), w2(l), w3(l))
-            square(l) = (v0*v0 - 1) + (v2*v2 + v3*v3)
+                                 merge(g12(l), a23(l), work%form(l) > 0.0_wp), v0(l), v2, v3)
+            call join_turns(work%form(l)*(1 + cosm1(l)), along(l), first(l), work%m2(l), last(l), 1 + v0(l), &
+                            v2, v3, w1(l), w2(l), w3(l))
+            dot(l) = work%form(l)*along(l)*(work%m2(l)*v2 + last(l)*v3)
+            square(l) = v0(l)*(2 + v0(l)) + (v2*v2 + v3*v3)
         end do
         do l = 1, lanes
-            call small_unit_turn(short_norm(square(l)), w1(l), w2(l), w3(l), square(l))
+            call small_unit_turn(cosm1(l), v0(l), dot(l), short_norm(square(l)), work%w0(l), w1(l), w2(l), w3(l))
             work%w1(l) = merge(w1(l), w3(l), work%form(l) > 0.0_wp)
             work%w2(l) = w2(l)
             work%w3(l) = merge(w3(l), w1(l), work%form(l) > 0.0_wp)
-        end do
-        do l = 1, lanes
-            work%w0(l) = short_scalar_part(square(l))
         end do
     end subroutine short_steps
 

@@ -49,7 +49,7 @@ contains
         real(wp), intent(inout), optional :: q(4)
         real(wp) :: t, a, b, g, m1, m2, m3, x1, x2, x3, pt, rt, p, r, rate, gg, size_m, size_q, largest
         real(wp) :: y, scd, u, w, k, a23, b31, g12, d1, d2, d3
-        real(wp) :: nu, v0, v1, v2, v3, angle, twist, cosine, along, square, e0, w0, w1, w2, w3, q3
+        real(wp) :: nu, v0, v1, v2, v3, angle, twist, cosm1, along, dot, square, change, w0, w1, w2, w3, q3
         integer :: i1, i2, i3
         integer :: reach
         logical :: plain, first_form
@@ -140,55 +140,53 @@ contains
         select case (reach)
         case (tiny_step)
             angle = angle + twist*tiny_third_kind(p + r, p*r, nu)
-            call tiny_turn(angle*angle*gg, along, cosine)
+            call tiny_turn(angle*angle*gg, along, cosm1)
         case (short_step)
             angle = angle + twist*short_third_kind(p + r, p*r, nu)
-            call small_turn(angle*angle*gg, along, cosine)
+            call small_turn(angle*angle*gg, along, cosm1)
         case default
             angle = angle + twist*y*sqrt(y)*middle_third_kind(u, w, nu*y)
-            call middle_turn(angle*angle*gg, along, cosine)
+            call middle_turn(angle*angle*gg, along, cosm1)
         end select
         along = angle*along
         if (first_form) then
             call short_direction(b, g, w, k*y, y, scd, m2, m3, b31, g12, v0, v2, v3)
-            call join_turns(cosine, along, m1, m2, m3, v0, v2, v3, w1, w2, w3)
-            e0 = cosine*v0 - along*(m2*v2 + m3*v3)
-            square = (v0*v0 - 1) + (v2*v2 + v3*v3)
+            call join_turns(1 + cosm1, along, m1, m2, m3, 1 + v0, v2, v3, w1, w2, w3)
+            dot = along*(m2*v2 + m3*v3)
+            square = v0*(2 + v0) + (v2*v2 + v3*v3)
         else
             call short_direction(b, a, u, k*y, y, scd, m2, m1, b31, a23, v0, v2, v1)
-            call join_turns(-cosine, along, m3, m2, m1, v0, v2, v1, w3, w2, w1)
-            e0 = cosine*v0 + along*(m2*v2 + m1*v1)
-            square = (v0*v0 - 1) + (v2*v2 + v1*v1)
+            call join_turns(-(1 + cosm1), along, m3, m2, m1, 1 + v0, v2, v1, w3, w2, w1)
+            dot = -along*(m2*v2 + m1*v1)
+            square = v0*(2 + v0) + (v2*v2 + v1*v1)
         end if
         select case (reach)
         case (tiny_step)
-            call small_unit_turn(tiny_norm(square), w1, w2, w3, square)
-            w0 = tiny_scalar_part(square)
+            change = tiny_norm(square)
         case (short_step)
-            call small_unit_turn(short_norm(square), w1, w2, w3, square)
-            w0 = short_scalar_part(square)
+            change = short_norm(square)
         case default
-            call unit_turn(e0, w0, w1, w2, w3)
+            change = -square/(sqrt(1 + square)*(1 + sqrt(1 + square)))
         end select
+        call small_unit_turn(cosm1, v0, dot, change, w0, w1, w2, w3)
         q3 = body%parity*q(1 + i3)
         call turn(w0, w1, w2, w3, q(1), q(1 + i1), q(1 + i2), q3)
         q(1 + i3) = body%parity*q3
     end subroutine flow_one
 
-    !> sin(x)/x and cos(x) from xx = x^2 <= tiny_turn_limit, to rounding.
-    pure subroutine tiny_turn(xx, sinc, cosine)
+    !> sin(x)/x and cos(x) - 1 from xx = x^2 <= tiny_turn_limit, to rounding.
+    pure subroutine tiny_turn(xx, sinc, cosm1)
         real(wp), intent(in) :: xx
-        real(wp), intent(out) :: sinc, cosine
+        real(wp), intent(out) :: sinc, cosm1
 
-        sinc = 1 - xx*(1/6.0_wp - xx*(1/120.0_wp - xx*(1/5040.0_wp)))
-        cosine = 1 - xx*(0.5_wp - xx*(1/24.0_wp - xx*(1/720.0_wp - xx*(1/40320.0_wp))))
+        sinc = (1 - xx*(1/6.0_wp)) + (xx*xx)*(1/120.0_wp - xx*(1/5040.0_wp))
+        cosm1 = -xx*((0.5_wp - xx*(1/24.0_wp)) + (xx*xx)*(1/720.0_wp - xx*(1/40320.0_wp)))
     end subroutine tiny_turn
 
-    !> sin(x)/x and cos(x) from xx = x^2 <= middle_turn_limit, to rounding.
-    pure subroutine middle_turn(xx, sinc, cosine)
+    !> sin(x)/x and cos(x) - 1 from xx = x^2 <= middle_turn_limit, to rounding.
+    pure subroutine middle_turn(xx, sinc, cosm1)
         real(wp), intent(in) :: xx
-        real(wp), intent(out) :: sinc, cosine
-
+        real(wp), intent(out) :: sinc, cosm1
         real(wp) :: x4, x8
 
         x4 = xx*xx
@@ -196,10 +194,9 @@ contains
         sinc = (((1 - xx*(1/6.0_wp)) + x4*(1/120.0_wp - xx*(1/5040.0_wp))) &
                 + x8*((1/362880.0_wp - xx*(1/39916800.0_wp)) &
                       + x4*(1/6227020800.0_wp - xx*(1/1307674368000.0_wp)))) + (x8*x8)*(1/355687428096000.0_wp)
-        cosine = (((1 - xx*0.5_wp) + x4*(1/24.0_wp - xx*(1/720.0_wp))) &
-                  + x8*((1/40320.0_wp - xx*(1/3628800.0_wp)) &
-                        + x4*(1/479001600.0_wp - xx*(1/87178291200.0_wp)))) &
-                 + (x8*x8)*(1/20922789888000.0_wp)
+        cosm1 = -xx*(((0.5_wp - xx*(1/24.0_wp)) + x4*(1/720.0_wp - xx*(1/40320.0_wp))) &
+                     + x8*((1/3628800.0_wp - xx*(1/479001600.0_wp)) &
+                           + x4*(1/87178291200.0_wp - xx*(1/20922789888000.0_wp))))
     end subroutine middle_turn
 
     !> First terms of short_norm.
@@ -209,16 +206,6 @@ contains
 
         change = -square*((0.5_wp - square*(3/8.0_wp)) + (square*square)*(5/16.0_wp - square*(35/128.0_wp)))
     end function tiny_norm
-
-    !> First terms of short_scalar_part.
-    pure function tiny_scalar_part(square) result(w0)
-        real(wp), intent(in) :: square
-        real(wp) :: w0
-        real(wp) :: x2
-
-        x2 = square*square
-        w0 = -square*((0.5_wp + square*0.125_wp) + x2*((1/16.0_wp + square*(5/128.0_wp)) + x2*(7/256.0_wp)))
-    end function tiny_scalar_part
 
     !> flow_one for a body whose own axes are not principal: the momentum is taken to principal axes, and only
     !> the increments are taken back, so that no rounding of the rotation gathers over many steps.
