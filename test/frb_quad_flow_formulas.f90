@@ -4,7 +4,8 @@ module frb_quad_flow_formulas
     implicit none
     private
 
-    public :: wp, short_series, short_momentum, short_direction, short_third_kind, small_turn, short_norm
+    public :: wp, tiny_series, tiny_third_kind, short_series, short_momentum, short_direction
+    public :: short_third_kind, small_turn, short_norm
     public :: small_unit_turn, middle_series, middle_third_kind, double_square, double_triple
     public :: base_angle, double_angle, long_momentum, long_direction, sin_cos, join_turns, turn, unit_turn
 

@@ -378,8 +378,9 @@ contains
     !> score when the turn is no longer small. One body and a batch.
     subroutine check_increments(t)
         type(tally), intent(inout) :: t
-        real(wp), parameter :: limits(8) = [tiny_limit, short_limit, middle_limit, square_limit, period_limit, &
-                                            tiny_turn_limit, small_turn_limit, middle_turn_limit]
+        real(wp), parameter :: limits(8) = [tiny_limit, short_limit, middle_limit, square_limit, &
+                                            period_limit, tiny_turn_limit, small_turn_limit, &
+                                            middle_turn_limit]
         real(wp), parameter :: small_turn = 0.5_wp
         type(stream) :: random
         type(reference_case) :: it

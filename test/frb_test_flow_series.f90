@@ -4,8 +4,8 @@
 module frb_test_flow_series
     use frb_checks, only: tally
     use frb_kinds, only: rp => wp
-    use frb_quad_flow_formulas, only: wp, short_series, short_third_kind, middle_series, middle_third_kind, &
-        small_turn, short_norm, double_square, double_triple
+    use frb_quad_flow_formulas, only: wp, tiny_series, tiny_third_kind, short_series, short_third_kind, &
+        middle_series, middle_third_kind, small_turn, short_norm, double_square, double_triple
     implicit none
     private
 
@@ -20,10 +20,10 @@ contains
         type(tally), intent(inout) :: t
         real(wp), parameter :: arguments(2, 4) = reshape([0.7_wp, 0.3_wp, 0.1_wp, 0.9_wp, 0.0_wp, 0.8_wp, &
                                                           0.6_wp, 0.6_wp], [2, 4])
-        real(wp) :: s_terms(0:most), y_terms(0:most), p, r, n, s, y, z, scd, c, d, error(8), sinc, cosm1
+        real(wp) :: s_terms(0:most), y_terms(0:most), p, r, n, s, y, z, scd, c, d, error(9), sinc, cosm1
         integer :: i, k
 
-        call t%open_suite('flow-series', 8)
+        call t%open_suite('flow-series', 9)
         error = 0.0_wp
         do i = 1, 4
             p = arguments(1, i)
@@ -31,7 +31,8 @@ contains
             n = 0.4_wp*i
             call square_series(p, r, y_terms)
             call middle_series(p + r, p*r, y, scd)
-            error(1) = max(error(1), abs(y - sum(y_terms(:8))), abs(scd - sum([((k + 1)*y_terms(k), k=0, 9)])))
+            error(1) = max(error(1), abs(y - sum(y_terms(:8))), &
+                           abs(scd - sum([((k + 1)*y_terms(k), k=0, 9)])))
             call short_series(p + r, p*r, y, scd)
             error(2) = max(error(2), abs(y - sum(y_terms(:5))))
             error(3) = max(error(3), abs(scd - sum([((k + 1)*y_terms(k), k=0, 5)])))
@@ -58,6 +59,7 @@ contains
             error(6) = max(error(6), abs(s - sum(s_terms)/4), abs(n - sum(s_terms)/4), &
                            abs(scd - n*(c/z)*(d/z)))
         end do
+        error(9) = tiny_error()
         call small_turn(0.5_wp, sinc, cosm1)
         s = 0.0_wp
         c = 0.0_wp
@@ -76,7 +78,8 @@ contains
             s = s + c
         end do
         error(8) = abs(short_norm(0.5_wp) - s)
-        call t%at_most('s-squared-and-its-derivative-of-a-middle-step-are-their-series', real(error(1), rp), rounding)
+        call t%at_most('s-squared-and-derivative-of-a-middle-step-are-their-series', real(error(1), rp), &
+                       rounding)
         call t%at_most('s-squared-of-a-short-step-is-its-series-to-degree-5', real(error(2), rp), rounding)
         call t%at_most('derivative-of-s-squared-is-its-series-to-degree-5', real(error(3), rp), rounding)
         call t%at_most('integral-of-a-middle-step-is-its-series-to-degree-7', real(error(4), rp), rounding)
@@ -84,8 +87,23 @@ contains
         call t%at_most('doublings-of-the-triple-agree', real(error(6), rp), rounding)
         call t%at_most('sine-and-cosine-of-a-small-turn-are-their-series', real(error(7), rp), rounding)
         call t%at_most('norm-of-a-short-step-is-its-series', real(error(8), rp), rounding)
+        call t%at_most('first-terms-are-those-of-the-series', real(error(9), rp), rounding)
         call t%close_suite()
     end subroutine test_flow_series
+
+    !> The first terms have those coefficients of the whole series that they take: at arguments so small that
+    !> what they leave out is beyond quadruple precision.
+    function tiny_error() result(error)
+        real(wp) :: error
+        real(wp), parameter :: p = 3.0e-9_wp, r = 5.0e-9_wp, smaller = 0.01_wp
+        real(wp) :: y(2), scd(2)
+
+        call tiny_series(p + r, p*r, y(1), scd(1))
+        call short_series(p + r, p*r, y(2), scd(2))
+        error = max(abs(y(1) - y(2)), abs(scd(1) - scd(2)), &
+                    abs(tiny_third_kind((p + r)*smaller, p*r*smaller**2, r*smaller) &
+                        - short_third_kind((p + r)*smaller, p*r*smaller**2, r*smaller)))
+    end function tiny_error
 
     !> Coefficients of s/t in t^2, at t = 1, from s'' = -(P + R) s + 2 P R s^3, s(0) = 0, s'(0) = 1.
     pure subroutine triple_series(p, r, terms)

@@ -253,7 +253,7 @@ contains
     subroutine check_conservation(t)
         type(tally), intent(inout) :: t
         real(wp), parameter :: moments(3) = [0.6_wp, 0.8_wp, 1.0_wp], m0(3) = [0.5_wp, -0.9_wp, 0.8_wp]
-        real(wp), parameter :: momentum_drift = 1.0e-13_wp, attitude_drift = 5.0e-14_wp
+        real(wp), parameter :: momentum_drift = 1.0e-13_wp, attitude_drift = 1.0e-13_wp
         real(wp) :: m(3), q(4), a(3, 3), space, defect
         integer :: i, frame
 

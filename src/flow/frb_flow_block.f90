@@ -3,8 +3,8 @@
 !> its block, so results are the same for any split of the bodies. A body that is out of reach (many periods
 !> in one step, extreme exponents, refused input) is left to the routine for one body.
 module frb_flow_block
-    use frb_flow_limits, only: tiny_limit, short_limit, small_turn_limit, middle_limit, square_limit, period_limit, &
-        smallest_denominator, sin_cos_limit
+    use frb_flow_limits, only: tiny_limit, short_limit, small_turn_limit, middle_limit, square_limit, &
+        period_limit, smallest_denominator, sin_cos_limit
     use frb_kinds, only: wp
     implicit none
     private
@@ -144,15 +144,16 @@ contains
         end do
     end subroutine short_triple
 
-    !> Short steps: increments of m; the turn when `with_attitude`. Several small loops: the processor then works
-    !> on all vectors of a block at a time, and constants stay in registers.
+    !> Short steps: increments of m; the turn when `with_attitude`. Several small loops: the processor then
+    !> works on all vectors of a block at a time, and constants stay in registers.
     subroutine short_steps(bodies, t, with_attitude, work)
         type(block_of_bodies), intent(in) :: bodies
         real(wp), intent(in) :: t
         logical, intent(in) :: with_attitude
         type(workspace), intent(inout) :: work
         real(wp) :: k0(lanes), u(lanes), w(lanes), along(lanes), cosm1(lanes), first(lanes), last(lanes)
-        real(wp) :: w1(lanes), w2(lanes), w3(lanes), square(lanes), dot(lanes), v0(lanes), a23(lanes), b31(lanes), g12(lanes)
+        real(wp) :: a23(lanes), b31(lanes), g12(lanes), square(lanes), dot(lanes), v0(lanes)
+        real(wp) :: w1(lanes), w2(lanes), w3(lanes)
         real(wp) :: v2, v3, angle
         integer :: l
 
@@ -190,7 +191,8 @@ contains
             square(l) = v0(l)*(2 + v0(l)) + (v2*v2 + v3*v3)
         end do
         do l = 1, lanes
-            call small_unit_turn(cosm1(l), v0(l), dot(l), short_norm(square(l)), work%w0(l), w1(l), w2(l), w3(l))
+            call small_unit_turn(cosm1(l), v0(l), dot(l), short_norm(square(l)), work%w0(l), w1(l), &
+                                 w2(l), w3(l))
             work%w1(l) = merge(w1(l), w3(l), work%form(l) > 0.0_wp)
             work%w2(l) = w2(l)
             work%w3(l) = merge(w3(l), w1(l), work%form(l) > 0.0_wp)
@@ -262,8 +264,8 @@ contains
                 new_s = 2*s(l)*((c(l)*d(l))*z(l))   ! for the angle; that of the motion is the root of y
                 new_ec = ec(l)
                 new_es = es(l)
-                call double_square(max(work%p(l), work%r(l)), min(work%p(l), work%r(l)), new_y, new_c, new_d, &
-                                   new_z)
+                call double_square(max(work%p(l), work%r(l)), min(work%p(l), work%r(l)), new_y, new_c, &
+                                   new_d, new_z)
                 call double_angle(work%nu(l), bg(l), y(l), z(l), new_s, new_c*new_d, new_z, new_ec, new_es)
                 y(l) = merge(new_y, y(l), squares(l) >= n)
                 z(l) = merge(new_z, z(l), squares(l) >= n)

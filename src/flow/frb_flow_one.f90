@@ -50,8 +50,7 @@ contains
         real(wp) :: t, a, b, g, m1, m2, m3, x1, x2, x3, pt, rt, p, r, rate, gg, size_m, size_q, largest
         real(wp) :: y, scd, u, w, k, a23, b31, g12, d1, d2, d3
         real(wp) :: nu, v0, v1, v2, v3, angle, twist, cosm1, along, dot, square, change, w0, w1, w2, w3, q3
-        integer :: i1, i2, i3
-        integer :: reach
+        integer :: i1, i2, i3, reach
         logical :: plain, first_form
 
         i1 = body%order(1)
@@ -193,7 +192,8 @@ contains
         x8 = x4*x4
         sinc = (((1 - xx*(1/6.0_wp)) + x4*(1/120.0_wp - xx*(1/5040.0_wp))) &
                 + x8*((1/362880.0_wp - xx*(1/39916800.0_wp)) &
-                      + x4*(1/6227020800.0_wp - xx*(1/1307674368000.0_wp)))) + (x8*x8)*(1/355687428096000.0_wp)
+                      + x4*(1/6227020800.0_wp - xx*(1/1307674368000.0_wp)))) &
+               + (x8*x8)*(1/355687428096000.0_wp)
         cosm1 = -xx*(((0.5_wp - xx*(1/24.0_wp)) + x4*(1/720.0_wp - xx*(1/40320.0_wp))) &
                      + x8*((1/3628800.0_wp - xx*(1/479001600.0_wp)) &
                            + x4*(1/87178291200.0_wp - xx*(1/20922789888000.0_wp))))
