@@ -3,13 +3,13 @@ module frb_chart_cost
     use frb, only: wp
     use frb_chart_methods, only: method, catalogue, find_method, style, family_dmv, family_batch
     use frb_chart_output, only: settings, open_table, open_script, draw, say, quantile
-    use frb_chart_timing, only: workload, new_workload, time_in_turn
+    use frb_chart_timing, only: workload, new_workload, time_over_steps
     use frb_chart_truth, only: new_case, errors_of
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
     implicit none
     private
 
-    public :: chart_cost, chart_speed
+    public :: chart_cost, chart_speed, measure_cost
 
     !> A body of order one that turns at 1 rad per unit of time, so that h is h omega.
     real(wp), parameter :: moments(3) = [1.0_wp, 1.5_wp, 2.0_wp]
@@ -23,31 +23,17 @@ contains
     subroutine chart_cost(options)
         type(settings), intent(in) :: options
         type(method), allocatable :: methods(:)
-        type(workload), allocatable :: works(:)
-        real(wp), allocatable :: steps(:), ns(:, :), table(:, :, :)
-        integer :: i, k, unit, repetitions
+        real(wp), allocatable :: table(:, :, :)
+        integer :: i, k, unit
 
         allocate (methods, source=catalogue())
-        allocate (steps, source=[(10.0_wp**(merge(k/1.0_wp, k/3.0_wp, options%quick) - 3), &
-                                  k=0, merge(4, 12, options%quick))])
-        repetitions = merge(5, 31, options%quick)
-        allocate (works(size(methods)), ns(size(methods), repetitions), table(7, size(methods), size(steps)))
-        do k = 1, size(steps)
-            do i = 1, size(methods)
-                works(i) = new_workload(methods(i), moments, start, steps(k), &
-                                        merge(1000, 1, methods(i)%family == family_batch))
-            end do
-            call time_in_turn(options, 'cost', works, merge(1.0e-3_wp, 2.0e-3_wp, options%quick), .false., ns)
-            call summarise(methods, ns, table(:, :, k))
-            table(1, :, k) = steps(k)
-        end do
-
+        call measure_cost(options, 'cost', methods, table)
         call open_table(options, 'cost', 'time per step against step size; a block per method', &
                         'h*omega, ns per step: median, quartiles, relative to the cheapest dmv: '// &
                         'median, quartiles', unit)
         do i = 1, size(methods)
             write (unit, '(a)') '# method: '//trim(methods(i)%key)
-            do k = 1, size(steps)
+            do k = 1, size(table, 3)
                 write (unit, '(es12.4,3f12.2,3f10.4)') table(:, i, k)
             end do
             write (unit, '(/)')
@@ -55,6 +41,32 @@ contains
         close (unit)
         call draw_cost(options, methods)
     end subroutine chart_cost
+
+    !> The numbers of the chart, table(column, method, step).
+    subroutine measure_cost(options, what, methods, table)
+        type(settings), intent(in) :: options
+        character(*), intent(in) :: what        !! is measured, for the progress on the terminal
+        type(method), intent(in) :: methods(:)
+        real(wp), allocatable, intent(out) :: table(:, :, :)
+        type(workload), allocatable :: works(:)
+        real(wp), allocatable :: steps(:), ns(:, :, :)
+        integer :: i, k
+
+        allocate (steps, source=[(10.0_wp**(merge(k/1.0_wp, k/3.0_wp, options%quick) - 3), &
+                                  k=0, merge(4, 12, options%quick))])
+        allocate (works(size(methods)), ns(size(methods), size(steps), merge(5, 9, options%quick)))
+        do i = 1, size(methods)
+            works(i) = new_workload(methods(i), moments, start, 1.0_wp, &
+                                    merge(1000, 1, methods(i)%family == family_batch))
+        end do
+        call time_over_steps(options, what, works, steps, merge(1.0e-3_wp, 2.0e-3_wp, options%quick), &
+                             merge(5, 20, options%quick), ns)
+        allocate (table(7, size(methods), size(steps)))
+        do k = 1, size(steps)
+            call summarise(methods, ns(:, k, :), table(:, :, k))
+            table(1, :, k) = steps(k)
+        end do
+    end subroutine measure_cost
 
     !> Medians and quartiles of the times and of their ratio to the cheapest rival of the same repetition.
     subroutine summarise(methods, ns, rows)
@@ -115,18 +127,16 @@ contains
             'flow', &
             'flow-m', 'flow-batch', 'flow-batch', 'flow-m', 'dmv2', 'dmv10', 'flow', 'frb_step', 'quat_step']
         integer, parameter :: bodies(*) = [1, 1, 1, 1, 1, 1, 1, 1000, 1000000, 1000, 1000, 1000, 1000, 1, 1]
-        real(wp), parameter :: steps(*) = [0.001_wp, 0.003_wp, 0.01_wp, 0.03_wp, 0.1_wp, 0.3_wp, 1.0_wp, &
+        real(wp), parameter :: all_steps(*) = [0.001_wp, 0.003_wp, 0.01_wp, 0.03_wp, 0.1_wp, 0.3_wp, 1.0_wp, &
             3.0_wp, 10.0_wp]
         type(workload), allocatable :: works(:)
-        real(wp), allocatable :: ns(:, :)
+        real(wp), allocatable :: steps(:), ns(:, :, :)
         character(200) :: line
         real(wp) :: error_m, error_q
-        integer :: i, k, unit, repetitions, every
+        integer :: i, k, unit
 
-        repetitions = merge(5, 9, options%quick)
-        every = merge(2, 1, options%quick)
-        allocate (ns(size(names), repetitions))
-        allocate (works(size(names)))
+        allocate (steps, source=all_steps(::merge(2, 1, options%quick)))
+        allocate (works(size(names)), ns(size(names), size(steps), merge(5, 9, options%quick)))
         do i = 1, size(names)
             works(i) = new_workload(find_method(trim(names(i))), moments, start, 1.0_wp, bodies(i))
         end do
@@ -141,18 +151,17 @@ contains
             '1000/1000  1000/1000  frb_step quat_step     dmv10')
         call say('             ns     ns     ns                                batch/    batch/   '// &
             'batch/dmv2 flow/dmv10    /flow     /flow     error')
-        do k = 1, size(steps), every
-            works%h = steps(k)
-            works%nsteps = 1
+        call time_over_steps(options, 'speed', works, steps, 2.0e-3_wp, merge(2, 10, options%quick), ns)
+        do k = 1, size(steps)
             call errors_of(find_method('dmv10'), new_case(moments, start, steps(k)), 1, error_m, error_q)
             if (error_q > 1.0e10_wp) error_q = ieee_value(error_q, ieee_quiet_nan)
-            call time_in_turn(options, 'speed', works, 2.0e-3_wp, .false., ns)
-            associate (dmv2 => ns(1, :), dmv10 => ns(5, :), flow => ns(6, :), &
-                       cheapest => minval(ns(1:5, :), dim=1))
+            associate (dmv2 => ns(1, k, :), dmv10 => ns(5, k, :), flow => ns(6, k, :), &
+                       cheapest => minval(ns(1:5, k, :), dim=1))
                 write (line, '(es9.1,3f7.1,9f10.3,es10.1)') steps(k), middle(dmv2), middle(dmv10), &
-                    middle(flow), middle(flow/dmv10), middle(flow/dmv2), middle(ns(7, :)/dmv10), &
-                    middle(ns(8, :)/cheapest), middle(ns(9, :)/cheapest), middle(ns(8, :)/ns(11, :)), &
-                    middle(ns(13, :)/ns(12, :)), middle(ns(14, :)/flow), middle(ns(15, :)/flow), error_q
+                    middle(flow), middle(flow/dmv10), middle(flow/dmv2), middle(ns(7, k, :)/dmv10), &
+                    middle(ns(8, k, :)/cheapest), middle(ns(9, k, :)/cheapest), &
+                    middle(ns(8, k, :)/ns(11, k, :)), middle(ns(13, k, :)/ns(12, k, :)), &
+                    middle(ns(14, k, :)/flow), middle(ns(15, k, :)/flow), error_q
             end associate
             write (unit, '(a)') trim(line)
             call say(trim(line))

@@ -129,7 +129,7 @@ contains
         end do
         allocate (ns(total, merge(5, 9, options%quick)))
         call time_in_turn(options, 'work-precision', works(:total), merge(0.5e-3_wp, 2.0e-3_wp, &
-            options%quick), .true., ns)
+            options%quick), merge(1, 4, options%quick), ns)
         total = 0
         do i = 1, size(methods)
             do k = 1, counts(i)

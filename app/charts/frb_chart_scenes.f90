@@ -4,7 +4,7 @@ module frb_chart_scenes
     use frb, only: wp
     use frb_chart_methods, only: method, catalogue, family_batch, family_momentum, family_dp, &
         family_dmv, family_flow
-    use frb_chart_output, only: settings, open_table, quantile, say, progress
+    use frb_chart_output, only: settings, open_table, quantile, say
     use frb_chart_timing, only: workload, new_workload, time_in_turn
     use frb_chart_truth, only: free_case, new_case, errors_of
     implicit none
@@ -23,23 +23,46 @@ module frb_chart_scenes
         logical :: momentum_only = .false.
     end type scene
 
+    !> A method that plays a scene.
+    type :: attempt
+        character(12) :: key = ''
+        integer :: steps = 0
+        real(wp) :: error = 0.0_wp
+    end type attempt
+
 contains
 
     !> All scenes. Each table row: scene, method, steps, time, error; the winner of a scene comes first.
     subroutine chart_scenes(options)
         type(settings), intent(in) :: options
         type(scene), allocatable :: scenes(:)
-        integer :: s, unit
+        type(workload), allocatable :: works(:)
+        type(attempt), allocatable :: attempts(:)
+        real(wp), allocatable :: ns(:, :)
+        integer, allocatable :: last(:)
+        integer :: s, n, unit
 
         allocate (scenes, source=all_scenes())
+        allocate (works(size(scenes)*size(catalogue())))
+        allocate (attempts(size(works)), last(0:size(scenes)))
+        n = 0
+        last(0) = 0
+        do s = 1, size(scenes)
+            call enter(scenes(s), works, attempts, n)
+            last(s) = n
+        end do
+        allocate (ns(n, merge(5, 9, options%quick)))
+        call time_in_turn(options, 'scenes', works(:n), merge(0.5e-3_wp, 2.0e-3_wp, options%quick), &
+                          merge(2, 8, options%quick), ns)
         call open_table(options, 'scenes', &
             'time each method needs for a scene, in as few steps as the bound on '// &
             'the error allows; fastest first', &
             'scene, method, steps, time per body [ns]: median, quartiles; '// &
             'error (attitude [rad], or of the momentum over its norm); bound', unit)
         do s = 1, size(scenes)
-            call play(options, scenes(s), unit)
-            call progress(options, 'scenes', s, size(scenes))
+            associate (from => last(s - 1) + 1, to => last(s))
+                call write_rows(unit, scenes(s), attempts(from:to), ns(from:to, :))
+            end associate
         end do
         close (unit)
     end subroutine chart_scenes
@@ -64,54 +87,58 @@ contains
             scene('loose-short-steps', general, m, 1.0_wp, 1.0e-3_wp, steps=100)])
     end function all_scenes
 
-    !> Plays a scene with every method that can, and writes its rows.
-    subroutine play(options, what, unit)
-        type(settings), intent(in) :: options
+    !> Adds every method that can play the scene, with the work it is.
+    subroutine enter(what, works, attempts, n)
         type(scene), intent(in) :: what
-        integer, intent(in) :: unit
+        type(workload), intent(inout) :: works(:)
+        type(attempt), intent(inout) :: attempts(:)
+        integer, intent(inout) :: n             !! works and attempts so far
         type(method), allocatable :: methods(:)
-        type(workload), allocatable :: works(:)
-        real(wp), allocatable :: ns(:, :), errors(:), times(:)
-        integer, allocatable :: steps(:)
-        logical, allocatable :: done(:)
         type(free_case) :: item
-        character(160) :: line
-        integer :: i, n, place, taken, row
+        real(wp) :: error
+        integer :: i, steps
 
         allocate (methods, source=catalogue())
         item = new_case(what%moments, what%m0, what%t)
-        allocate (works(size(methods)), errors(size(methods)), steps(size(methods)))
-        n = 0
         do i = 1, size(methods)
             if (methods(i)%family == family_momentum .and. .not. what%momentum_only) cycle
             if (what%bodies > 1 .and. all(methods(i)%family /= [family_batch, family_flow, family_dmv])) cycle
             if (what%bodies == 1 .and. methods(i)%family == family_batch) cycle
             if (methods(i)%family == family_dp .and. what%steps > 0) cycle
-            call fewest_steps(methods(i), what, item, taken, errors(n + 1))
-            if (taken == 0) cycle
+            call fewest_steps(methods(i), what, item, steps, error)
+            if (steps == 0) cycle
             n = n + 1
-            steps(n) = taken
-            works(n) = new_workload(methods(i), what%moments, what%m0, what%t/taken, what%bodies)
-            works(n)%nsteps = taken
+            attempts(n) = attempt(methods(i)%key, steps, error)
+            works(n) = new_workload(methods(i), what%moments, what%m0, what%t/steps, what%bodies)
+            works(n)%nsteps = steps
         end do
-        allocate (ns(n, merge(5, 15, options%quick)), times(n), done(n))
-        call time_in_turn(options, what%name, works(:n), merge(0.5e-3_wp, 2.0e-3_wp, options%quick), &
-            .true., ns)
-        do i = 1, n
-            times(i) = quantile(ns(i, :), 0.5_wp)*steps(i)
+    end subroutine enter
+
+    !> The rows of a scene, the fastest first.
+    subroutine write_rows(unit, what, attempts, ns)
+        integer, intent(in) :: unit
+        type(scene), intent(in) :: what
+        type(attempt), intent(in) :: attempts(:)
+        real(wp), intent(in) :: ns(:, :)
+        real(wp) :: times(3, size(attempts))
+        logical :: done(size(attempts))
+        character(160) :: line
+        integer :: i, place, row
+
+        do i = 1, size(attempts)
+            times(:, i) = attempts(i)%steps*[quantile(ns(i, :), 0.5_wp), quantile(ns(i, :), 0.25_wp), &
+                quantile(ns(i, :), 0.75_wp)]
         end do
         done = .false.
-        do row = 1, n
-            place = minloc(times, dim=1, mask=.not. done)
+        do row = 1, size(attempts)
+            place = minloc(times(1, :), dim=1, mask=.not. done)
             done(place) = .true.
-            write (line, '(a20,a14,i8,3es12.4,2es10.2)') what%name, works(place)%with%key, steps(place), &
-                times(place), &
-                quantile(ns(place, :), 0.25_wp)*steps(place), quantile(ns(place, :), 0.75_wp)*steps(place), &
-                errors(place), what%bound
+            write (line, '(a20,a14,i8,3es12.4,2es10.2)') what%name, attempts(place)%key, &
+                attempts(place)%steps, times(:, place), attempts(place)%error, what%bound
             write (unit, '(a)') trim(line)
             if (row == 1) call say('  '//trim(line(:54)))
         end do
-    end subroutine play
+    end subroutine write_rows
 
     !> The fewest steps, of 1, 2, 4, ..., with which the method stays within the bound, or the steps of the
     !> scene when they do; 0 if none.

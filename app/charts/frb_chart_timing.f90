@@ -1,5 +1,5 @@
-!> The stopwatch of the charts: all methods in one process, repetition after repetition in turn, so that a
-!> disturbance hits all of them alike.
+!> The stopwatch of the charts: all methods in one process and in turn, so that a disturbance hits all of them
+!> and all their repetitions alike.
 module frb_chart_timing
     use frb, only: wp, free_flow
     use frb_chart_methods, only: method, advance, constants, new_constants, family_flow, family_batch, &
@@ -10,7 +10,7 @@ module frb_chart_timing
     implicit none
     private
 
-    public :: workload, new_workload, time_in_turn, run, clock, threads_there
+    public :: workload, new_workload, time_in_turn, time_over_steps, run, clock, threads_there
 
     !> A method at work: a chain of steps of one body, or steps of many bodies.
     type :: workload
@@ -18,7 +18,7 @@ module frb_chart_timing
         real(wp) :: moments(3) = 1.0_wp
         real(wp) :: h = 1.0_wp
         integer :: bodies = 1
-        integer :: nsteps = 1               !! steps per repetition
+        integer :: nsteps = 1               !! steps per round
         integer :: threads = 1              !! of the batch form; more than one needs -fopenmp
         logical :: by_the_wall = .false.    !! measured on the wall, as several threads must be
         integer :: rounds = 1               !! times the nsteps are taken, each from the start
@@ -53,41 +53,120 @@ contains
         end do
     end function new_workload
 
-    !> Nanoseconds per body and step, ns(work, repetition). The number of steps of each work is first set so
-    !> that a repetition takes about `seconds`, unless `fixed_steps`: then only the rounds are.
-    subroutine time_in_turn(options, what, works, seconds, fixed_steps, ns)
+    !> Nanoseconds per body and step, ns(work, repetition). A repetition is cut into slices of `seconds`, as
+    !> many rounds as that takes, and the slices of all works and repetitions take turns. Each repetition so
+    !> lasts as long as the run: a neighbour on the processor who comes and goes, for a tenth of a second or
+    !> half a minute, slows all of them alike and no point by itself.
+    subroutine time_in_turn(options, what, works, seconds, slices, ns)
         type(settings), intent(in) :: options
         character(*), intent(in) :: what
         type(workload), intent(inout) :: works(:)
         real(wp), intent(in) :: seconds
-        logical, intent(in) :: fixed_steps
+        integer, intent(in) :: slices
         real(wp), intent(out) :: ns(:, :)
-        real(wp) :: took
-        integer :: i, repetition, multiple
+        integer :: i, slice, repetition, turn
 
         do i = 1, size(works)
-            do
-                took = run(works(i))
-                if (took >= seconds/4) exit
-                multiple = 1 + min(15, int(seconds/max(took, 1.0e-7_wp)))
-                if (fixed_steps) then
-                    works(i)%rounds = works(i)%rounds*multiple
-                else
-                    works(i)%nsteps = works(i)%nsteps*multiple
-                end if
-                if (multiple == 1) exit
-            end do
+            call lengthen(works(i), seconds, .true.)
         end do
-        do repetition = 1, size(ns, 2)
-            do i = 1, size(works)
-                took = run(works(i))
-                ns(i, repetition) = 1.0e9_wp*took/(real(works(i)%nsteps, wp)*works(i)%rounds*works(i)%bodies)
+        ns = 0.0_wp
+        turn = 0
+        do slice = 1, slices
+            do repetition = 1, size(ns, 2)
+                turn = turn + 1
+                do i = 1, size(works)
+                    ns(i, repetition) = ns(i, repetition) + nanoseconds(works(i), turn)/slices
+                end do
+                call progress(options, what, turn, slices*size(ns, 2))
             end do
-            call progress(options, what, repetition, size(ns, 2))
         end do
     end subroutine time_in_turn
 
-    !> Seconds one repetition takes.
+    !> The same for steps of several sizes h, ns(work, h, repetition); a slice is one chain of steps.
+    subroutine time_over_steps(options, what, works, h, seconds, slices, ns)
+        type(settings), intent(in) :: options
+        character(*), intent(in) :: what
+        type(workload), intent(inout) :: works(:)
+        real(wp), intent(in) :: h(:)
+        real(wp), intent(in) :: seconds
+        integer, intent(in) :: slices
+        real(wp), intent(out) :: ns(:, :, :)
+        integer :: nsteps(size(works), size(h))
+        integer :: i, k, slice, repetition, turn
+
+        do k = 1, size(h)
+            do i = 1, size(works)
+                works(i)%h = h(k)
+                works(i)%nsteps = 1
+                call lengthen(works(i), seconds, .false.)
+                nsteps(i, k) = works(i)%nsteps
+            end do
+        end do
+        ns = 0.0_wp
+        turn = 0
+        do slice = 1, slices
+            do repetition = 1, size(ns, 3)
+                turn = turn + 1
+                do k = 1, size(h)
+                    do i = 1, size(works)
+                        works(i)%h = h(k)
+                        works(i)%nsteps = nsteps(i, k)
+                        ns(i, k, repetition) = ns(i, k, repetition) + nanoseconds(works(i), turn)/slices
+                    end do
+                end do
+                call progress(options, what, turn, slices*size(ns, 3))
+            end do
+        end do
+    end subroutine time_over_steps
+
+    !> Raises the number of rounds, or of steps, until the work takes about `seconds`.
+    subroutine lengthen(work, seconds, by_rounds)
+        type(workload), intent(inout) :: work
+        real(wp), intent(in) :: seconds
+        logical, intent(in) :: by_rounds
+        real(wp) :: took
+        integer :: multiple
+
+        do
+            took = run(work)
+            if (took >= seconds/4) exit
+            multiple = 1 + min(15, int(seconds/max(took, 1.0e-7_wp)))
+            if (by_rounds) then
+                work%rounds = work%rounds*multiple
+            else
+                work%nsteps = work%nsteps*multiple
+            end if
+            if (multiple == 1) exit
+        end do
+    end subroutine lengthen
+
+    !> Time of one slice, per body and step; every turn finds the stack elsewhere.
+    function nanoseconds(work, turn) result(ns)
+        type(workload), intent(inout) :: work
+        integer, intent(in) :: turn
+        real(wp) :: ns
+        integer, parameter :: places = 64
+
+        ns = 1.0e9_wp*run_below(work, mod(turn, places))/(real(work%nsteps, wp)*work%rounds*work%bodies)
+    end function nanoseconds
+
+    !> `run` with the stack so many pages further down. Where the working storage of a batch lies changes its
+    !> time by up to 15 %, and a process would keep to one place; over many places it averages out.
+    recursive function run_below(work, pages) result(seconds)
+        type(workload), intent(inout) :: work
+        integer, intent(in) :: pages
+        real(wp) :: seconds
+        real(wp), volatile :: page(512)     ! volatile, and set after the call: else it takes no room
+
+        if (pages > 0) then
+            seconds = run_below(work, pages - 1)
+        else
+            seconds = run(work)
+        end if
+        page(1) = seconds
+    end function run_below
+
+    !> Seconds all rounds take.
     function run(work) result(seconds)
         type(workload), intent(inout) :: work
         real(wp) :: seconds
