@@ -130,13 +130,14 @@ contains
         real(wp), parameter :: all_steps(*) = [0.001_wp, 0.003_wp, 0.01_wp, 0.03_wp, 0.1_wp, 0.3_wp, 1.0_wp, &
             3.0_wp, 10.0_wp]
         type(workload), allocatable :: works(:)
-        real(wp), allocatable :: steps(:), ns(:, :, :)
+        real(wp), allocatable :: steps(:), ns(:, :, :), ratios(:, :)
         character(200) :: line
-        real(wp) :: error_m, error_q
+        real(wp) :: error_m, error_q, width
         integer :: i, k, unit
 
         allocate (steps, source=all_steps(::merge(2, 1, options%quick)))
         allocate (works(size(names)), ns(size(names), size(steps), merge(5, 9, options%quick)))
+        allocate (ratios(size(ns, 3), 9))
         do i = 1, size(names)
             works(i) = new_workload(find_method(trim(names(i))), moments, start, 1.0_wp, bodies(i))
         end do
@@ -145,10 +146,11 @@ contains
             'h*omega, dmv2 [ns], dmv10 [ns], free flow [ns], flow/dmv10, flow/dmv2, momentum only/dmv10, '// &
             'batch of 1000/cheapest dmv, batch of 1e6/cheapest dmv, batch of 1000/dmv2 over 1000 bodies, '// &
             'scalar flow over 1000 bodies/dmv10 over 1000 bodies, frb_step/flow, quat_step/flow, '// &
-            'error of one step of dmv10 [rad] (it does not converge for long steps)', unit)
+            'error of one step of dmv10 [rad] (it does not converge for long steps), spread: the largest '// &
+            'distance of the quartiles of a ratio of the row, over its median', unit)
         call say('ratios; "1000" and "1e6": so many bodies; dmv: the cheapest order for one body')
         call say(' h omega   dmv2  dmv10   flow flow/dmv10 flow/dmv2  m/dmv10  1000/dmv   1e6/dmv  '// &
-            '1000/1000  1000/1000  frb_step quat_step     dmv10')
+            '1000/1000  1000/1000  frb_step quat_step     dmv10  spread')
         call say('             ns     ns     ns                                batch/    batch/   '// &
             'batch/dmv2 flow/dmv10    /flow     /flow     error')
         call time_over_steps(options, 'speed', works, steps, 2.0e-3_wp, merge(2, 10, options%quick), ns)
@@ -157,11 +159,19 @@ contains
             if (error_q > 1.0e10_wp) error_q = ieee_value(error_q, ieee_quiet_nan)
             associate (dmv2 => ns(1, k, :), dmv10 => ns(5, k, :), flow => ns(6, k, :), &
                        cheapest => minval(ns(1:5, k, :), dim=1))
-                write (line, '(es9.1,3f7.1,9f10.3,es10.1)') steps(k), middle(dmv2), middle(dmv10), &
-                    middle(flow), middle(flow/dmv10), middle(flow/dmv2), middle(ns(7, k, :)/dmv10), &
-                    middle(ns(8, k, :)/cheapest), middle(ns(9, k, :)/cheapest), &
-                    middle(ns(8, k, :)/ns(11, k, :)), middle(ns(13, k, :)/ns(12, k, :)), &
-                    middle(ns(14, k, :)/flow), middle(ns(15, k, :)/flow), error_q
+                ratios(:, 1) = flow/dmv10
+                ratios(:, 2) = flow/dmv2
+                ratios(:, 3) = ns(7, k, :)/dmv10
+                ratios(:, 4) = ns(8, k, :)/cheapest
+                ratios(:, 5) = ns(9, k, :)/cheapest
+                ratios(:, 6) = ns(8, k, :)/ns(11, k, :)
+                ratios(:, 7) = ns(13, k, :)/ns(12, k, :)
+                ratios(:, 8) = ns(14, k, :)/flow
+                ratios(:, 9) = ns(15, k, :)/flow
+                width = maxval([((quantile(ratios(:, i), 0.75_wp) - quantile(ratios(:, i), 0.25_wp)) &
+                                  /middle(ratios(:, i)), i=1, 9)])
+                write (line, '(es9.1,3f7.1,9f10.3,es10.1,f8.3)') steps(k), middle(dmv2), middle(dmv10), &
+                    middle(flow), (middle(ratios(:, i)), i=1, 9), error_q, width
             end associate
             write (unit, '(a)') trim(line)
             call say(trim(line))

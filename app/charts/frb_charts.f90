@@ -1,6 +1,7 @@
 !> Measures every method on the same work and draws speed against accuracy, and accuracy against closeness to
 !> the places where methods fail. Without arguments it lists the charts and draws none.
 program frb_charts
+    use frb_chart_agreement, only: chart_agreement
     use frb_chart_cost, only: chart_cost, chart_speed
     use frb_chart_failure, only: chart_failure
     use frb_chart_orbits, only: chart_orbits, chart_racket
@@ -25,7 +26,7 @@ program frb_charts
     end interface
 
     character(*), parameter :: names(*) = [character(16) :: 'speed', 'scenes', 'cost', 'work-precision', &
-        'heavy-top', 'torque', 'failure', 'growth', 'triangle', 'scale', 'orbits']
+        'heavy-top', 'torque', 'failure', 'growth', 'triangle', 'scale', 'orbits', 'agreement']
     type(settings) :: options
     character(:), allocatable :: argument
     logical :: wanted(size(names))
@@ -47,7 +48,7 @@ program frb_charts
             call list_charts()
             stop
         case ('all')
-            wanted = .true.
+            where (names /= 'agreement') wanted = .true.
         case default
             which = findloc(names == argument, .true., dim=1)
             if (which == 0) call refuse('no such chart: '//argument)
@@ -92,6 +93,8 @@ program frb_charts
             call chart_orbits(options)
             call chart_racket(options)
             call chart_torus(options)
+        case ('agreement')
+            call chart_agreement(options)
         case default
             error stop 'a chart is named that is not drawn'
         end select
@@ -112,7 +115,7 @@ contains
 
     subroutine list_charts()
         call say('usage: fpm run frb_charts --profile release -- [WHAT ...] [--quick] [--out DIR]')
-        call say('WHAT: all, or any of')
+        call say('WHAT: all, which is all but the last, or any of')
         call say('  speed           table: the free flow against discrete Moser-Veselov, ratios of time')
         call say('  scenes          table: which method for which scene')
         call say('  cost            time per step against step size, all methods')
@@ -124,6 +127,7 @@ contains
         call say('  triangle        error of one step h = 1 over all shapes of a body')
         call say('  scale           time per body against the number of bodies')
         call say('  orbits          polhodes, the tennis racket, the torus of a heavy top')
+        call say('  agreement       check: measures cost twice, tells how many ratios agree within 15 %')
         call say('--quick: a minute for all of them; --out DIR: where the tables, scripts and '// &
             'pictures go (charts)')
     end subroutine list_charts
