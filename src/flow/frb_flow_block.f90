@@ -6,6 +6,7 @@ module frb_flow_block
     use frb_flow_limits, only: tiny_limit, short_limit, small_turn_limit, middle_limit, square_limit, &
         period_limit, smallest_denominator, sin_cos_limit
     use frb_kinds, only: wp
+    use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
@@ -23,9 +24,11 @@ module frb_flow_block
     !> What the loops of flow_block hand to one another, one number a lane.
     type :: workspace
         real(wp) :: m1(lanes), m2(lanes), m3(lanes), gg(lanes)      !! momentum before the step, its square
-        real(wp) :: a(lanes), b(lanes), g(lanes), p(lanes), r(lanes), nu(lanes)
+        real(wp) :: a(lanes), b(lanes), g(lanes), p(lanes), r(lanes), nu(lanes), k(lanes)
+        real(wp) :: reach(lanes), square(lanes)                     !! max(p, r); square of the angle a1 t
         real(wp) :: form(lanes)                                     !! 1: first form, -1: its mirror image
         real(wp) :: long(lanes)                                     !! 1: beyond the short series, else 0
+        real(wp) :: long_p(lanes), long_r(lanes), long_nu(lanes)    !! p, r, nu of long lanes, see sort_lanes
         real(wp) :: y(lanes), scd(lanes), third(lanes)              !! s^2, s c d, H of short steps
         real(wp) :: d1(lanes), d2(lanes), d3(lanes)                 !! increments of the momentum
         real(wp) :: w0(lanes), w1(lanes), w2(lanes), w3(lanes)      !! the turn e z - 1
@@ -40,12 +43,10 @@ contains
         real(wp), intent(in) :: t
         logical, intent(in) :: with_attitude
         type(workspace) :: work
-        real(wp) :: square, y2, y3
-        integer :: l, reached, resting, many_short, many_long
+        real(wp) :: pt, rt
+        integer(int64) :: reach, square
+        integer :: l, many_long
 
-        many_long = 0
-        many_short = 0
-        resting = 0
         do l = 1, lanes
             work%a(l) = bodies%alpha(l)*t
             work%b(l) = bodies%beta(l)*t
@@ -54,27 +55,31 @@ contains
             work%m2(l) = bodies%m(l, 2)
             work%m3(l) = bodies%m(l, 3)
             work%gg(l) = work%m1(l)**2 + work%m2(l)**2 + work%m3(l)**2
-            y2 = work%b(l)*work%m1(l)**2 + work%a(l)*work%m2(l)**2
-            y3 = work%g(l)*work%m2(l)**2 + work%b(l)*work%m3(l)**2
-            work%p(l) = work%g(l)*y2
-            work%r(l) = work%a(l)*y3
+            pt = work%b(l)*work%m1(l)**2 + work%a(l)*work%m2(l)**2
+            rt = work%g(l)*work%m2(l)**2 + work%b(l)*work%m3(l)**2
+            work%p(l) = work%g(l)*pt
+            work%r(l) = work%a(l)*rt
+            work%k(l) = work%a(l)*work%g(l)*work%m2(l)**2
             ! Of the two mirror forms the one with the smaller parameter nu of the third kind.
-            work%nu(l) = min(work%g(l)*y3, work%a(l)*y2)
-            work%form(l) = merge(1.0_wp, -1.0_wp, work%g(l)*y3 <= work%a(l)*y2)
-            square = (bodies%a1(l)*t)**2*work%gg(l)
-            reached = merge(1, 0, max(work%p(l), work%r(l)) <= period_limit .and. square <= sin_cos_limit**2)
-            resting = resting + (1 - reached)
-            bodies%served(l) = iand(bodies%served(l), reached)
-            work%long(l) = merge(1.0_wp, 0.0_wp, &
-                                 max(work%p(l), work%r(l)) > short_limit .or. square > small_turn_limit)
-            work%long(l) = merge(work%long(l), 0.0_wp, bodies%served(l) == 1)
-            many_long = many_long + merge(1, 0, work%long(l) > 0.0_wp)
-            many_short = many_short + merge(1, 0, max(work%p(l), work%r(l)) > tiny_limit)
+            work%nu(l) = min(work%g(l)*rt, work%a(l)*pt)
+            work%form(l) = merge(1.0_wp, -1.0_wp, work%g(l)*rt <= work%a(l)*pt)
+            work%reach(l) = max(work%p(l), work%r(l))
+            work%square(l) = (bodies%a1(l)*t)**2*work%gg(l)
         end do
-        if (resting > 0) call rest_lanes(bodies, work)
-        ! Short and long lanes in one block: each loop runs over all lanes, each lane takes its own result.
+        ! Largest of each; the bits of numbers >= 0 are ordered as the numbers are.
+        reach = 0_int64
+        square = 0_int64
+        do l = 1, lanes
+            reach = max(reach, transfer(work%reach(l), 0_int64))
+            square = max(square, transfer(work%square(l), 0_int64))
+        end do
+        many_long = 0
+        if (reach > transfer(short_limit, 0_int64) .or. square > transfer(small_turn_limit, 0_int64)) then
+            call sort_lanes(bodies, work, many_long)
+        end if
+        ! Lanes of all sorts in one block: each loop runs over all lanes, each lane takes its own result.
         call tiny_triple(with_attitude, work)
-        if (many_short > 0) call short_triple(with_attitude, work)
+        if (reach > transfer(tiny_limit, 0_int64)) call short_triple(with_attitude, work)
         call short_steps(bodies, t, with_attitude, work)
         if (many_long > 0) call long_steps(bodies, t, with_attitude, work)
         if (with_attitude) then
@@ -90,26 +95,44 @@ contains
         end do
     end subroutine flow_block
 
-    !> Lanes out of reach: no number of theirs may overflow on the way.
-    subroutine rest_lanes(bodies, work)
-        type(block_of_bodies), intent(in) :: bodies
+    !> Tells long lanes and lanes out of reach. Long ones run through the routines for short steps with
+    !> p = r = nu = k = 0, and those out of reach rest, so that no number overflows on the way.
+    subroutine sort_lanes(bodies, work, many_long)
+        type(block_of_bodies), intent(inout) :: bodies
         type(workspace), intent(inout) :: work
+        integer, intent(out) :: many_long
         integer :: l
 
+        many_long = 0
         do l = 1, lanes
-            if (bodies%served(l) == 1) cycle
-            work%m1(l) = 0.0_wp
-            work%m2(l) = 0.0_wp
-            work%m3(l) = 0.0_wp
-            work%gg(l) = 0.0_wp
-            work%p(l) = 0.0_wp
-            work%r(l) = 0.0_wp
-            work%nu(l) = 0.0_wp
+            if (work%reach(l) > period_limit .or. work%square(l) > sin_cos_limit**2) bodies%served(l) = 0
+            work%long(l) = 0.0_wp
+            if (bodies%served(l) == 0) then
+                work%m1(l) = 0.0_wp
+                work%m2(l) = 0.0_wp
+                work%m3(l) = 0.0_wp
+                work%gg(l) = 0.0_wp
+                work%p(l) = 0.0_wp
+                work%r(l) = 0.0_wp
+                work%nu(l) = 0.0_wp
+                work%k(l) = 0.0_wp
+            else if (work%reach(l) > short_limit .or. work%square(l) > small_turn_limit) then
+                work%long(l) = 1.0_wp
+                many_long = many_long + 1
+            end if
         end do
-    end subroutine rest_lanes
+        do l = 1, lanes
+            work%long_p(l) = work%p(l)
+            work%long_r(l) = work%r(l)
+            work%long_nu(l) = work%nu(l)
+            work%p(l) = merge(work%p(l), 0.0_wp, work%long(l) <= 0.0_wp)
+            work%r(l) = merge(work%r(l), 0.0_wp, work%long(l) <= 0.0_wp)
+            work%nu(l) = merge(work%nu(l), 0.0_wp, work%long(l) <= 0.0_wp)
+            work%k(l) = merge(work%k(l), 0.0_wp, work%long(l) <= 0.0_wp)
+        end do
+    end subroutine sort_lanes
 
-    !> The triple and the integral of the third kind by the first terms of their series. Lanes that the short
-    !> series do not reach run along with p = r = nu = 0, here and in the next two routines.
+    !> The triple and the integral of the third kind by the first terms of their series.
     subroutine tiny_triple(with_attitude, work)
         logical, intent(in) :: with_attitude
         type(workspace), intent(inout) :: work
@@ -117,8 +140,8 @@ contains
         integer :: l
 
         do l = 1, lanes
-            p = merge(work%p(l), 0.0_wp, work%long(l) <= 0.0_wp)
-            r = merge(work%r(l), 0.0_wp, work%long(l) <= 0.0_wp)
+            p = work%p(l)
+            r = work%r(l)
             call tiny_series(p + r, p*r, work%y(l), work%scd(l))
             if (with_attitude) work%third(l) = tiny_third_kind(p + r, p*r, work%nu(l))
         end do
@@ -132,8 +155,8 @@ contains
         integer :: l
 
         do l = 1, lanes
-            p = merge(work%p(l), 0.0_wp, work%long(l) <= 0.0_wp)
-            r = merge(work%r(l), 0.0_wp, work%long(l) <= 0.0_wp)
+            p = work%p(l)
+            r = work%r(l)
             call short_series(p + r, p*r, y, scd)
             work%y(l) = merge(work%y(l), y, max(p, r) <= tiny_limit)
             work%scd(l) = merge(work%scd(l), scd, max(p, r) <= tiny_limit)
@@ -151,7 +174,7 @@ contains
         real(wp), intent(in) :: t
         logical, intent(in) :: with_attitude
         type(workspace), intent(inout) :: work
-        real(wp) :: k0(lanes), u(lanes), w(lanes), along(lanes), cosm1(lanes), first(lanes), last(lanes)
+        real(wp) :: u(lanes), w(lanes), along(lanes), cosm1(lanes), first(lanes), last(lanes)
         real(wp) :: a23(lanes), b31(lanes), g12(lanes), square(lanes), dot(lanes), v0(lanes)
         real(wp) :: w1(lanes), w2(lanes), w3(lanes)
         real(wp) :: v2, v3, angle
@@ -161,12 +184,11 @@ contains
             a23(l) = work%a(l)*(work%m2(l)*work%m3(l))
             b31(l) = work%b(l)*(work%m3(l)*work%m1(l))
             g12(l) = work%g(l)*(work%m1(l)*work%m2(l))
-            u(l) = merge(work%p(l)*work%y(l), 0.0_wp, work%long(l) <= 0.0_wp)
-            w(l) = merge(work%r(l)*work%y(l), 0.0_wp, work%long(l) <= 0.0_wp)
-            k0(l) = merge(work%a(l)*work%g(l)*work%m2(l)**2, 0.0_wp, work%long(l) <= 0.0_wp)
+            u(l) = work%p(l)*work%y(l)
+            w(l) = work%r(l)*work%y(l)
         end do
         do l = 1, lanes
-            call short_momentum(u(l), w(l), k0(l)*(work%scd(l)*work%scd(l)), work%scd(l), &
+            call short_momentum(u(l), w(l), work%k(l)*(work%scd(l)*work%scd(l)), work%scd(l), &
                                 work%m1(l), work%m2(l), work%m3(l), a23(l), b31(l), g12(l), &
                                 work%d1(l), work%d2(l), work%d3(l))
         end do
@@ -182,7 +204,7 @@ contains
             first(l) = merge(work%m1(l), work%m3(l), work%form(l) > 0.0_wp)
             last(l) = merge(work%m3(l), work%m1(l), work%form(l) > 0.0_wp)
             call short_direction(work%b(l), merge(work%g(l), work%a(l), work%form(l) > 0.0_wp), &
-                                 merge(w(l), u(l), work%form(l) > 0.0_wp), k0(l)*work%y(l), work%y(l), &
+                                 merge(w(l), u(l), work%form(l) > 0.0_wp), work%k(l)*work%y(l), work%y(l), &
                                  work%scd(l), work%m2(l), last(l), b31(l), &
                                  merge(g12(l), a23(l), work%form(l) > 0.0_wp), v0(l), v2, v3)
             call join_turns(work%form(l)*(1 + cosm1(l)), along(l), first(l), work%m2(l), last(l), 1 + v0(l), &
@@ -224,7 +246,7 @@ contains
         do
             over = 0
             do l = 1, lanes
-                n = max(work%p(l), work%r(l))*f(l)*f(l)
+                n = max(work%long_p(l), work%long_r(l))*f(l)*f(l)
                 n = merge(1.0_wp, 0.0_wp, work%long(l) > 0.0_wp .and. n > square_limit)
                 triples(l) = triples(l) + n
                 f(l) = f(l)*(1 - 0.5_wp*n)
@@ -237,7 +259,7 @@ contains
         do
             over = 0
             do l = 1, lanes
-                n = max(work%p(l), work%r(l))*f(l)*f(l)     ! nu is never larger
+                n = max(work%long_p(l), work%long_r(l))*f(l)*f(l)     ! nu is never larger
                 n = merge(1.0_wp, 0.0_wp, work%long(l) > 0.0_wp .and. n > middle_limit)
                 squares(l) = squares(l) + n
                 f(l) = f(l)*(1 - 0.5_wp*n)
@@ -248,12 +270,13 @@ contains
         end do
         do l = 1, lanes
             n = f(l)*f(l)
-            call middle_series((work%p(l) + work%r(l))*n, work%p(l)*work%r(l)*(n*n), y(l), new_y)
+            call middle_series((work%long_p(l) + work%long_r(l))*n, work%long_p(l)*work%long_r(l)*(n*n), &
+                               y(l), new_y)
             y(l) = y(l)*n
             s(l) = sqrt(y(l))
-            call base_angle(work%p(l), work%r(l), work%nu(l), bg(l), s(l), y(l), ec(l), es(l))
-            c(l) = sqrt(1 - max(work%p(l), work%r(l))*y(l))
-            d(l) = sqrt(1 - min(work%p(l), work%r(l))*y(l))
+            call base_angle(work%long_p(l), work%long_r(l), work%long_nu(l), bg(l), s(l), y(l), ec(l), es(l))
+            c(l) = sqrt(1 - max(work%long_p(l), work%long_r(l))*y(l))
+            d(l) = sqrt(1 - min(work%long_p(l), work%long_r(l))*y(l))
             z(l) = 1.0_wp
         end do
         do i = 1, most_squares
@@ -264,9 +287,10 @@ contains
                 new_s = 2*s(l)*((c(l)*d(l))*z(l))   ! for the angle; that of the motion is the root of y
                 new_ec = ec(l)
                 new_es = es(l)
-                call double_square(max(work%p(l), work%r(l)), min(work%p(l), work%r(l)), new_y, new_c, &
-                                   new_d, new_z)
-                call double_angle(work%nu(l), bg(l), y(l), z(l), new_s, new_c*new_d, new_z, new_ec, new_es)
+                call double_square(max(work%long_p(l), work%long_r(l)), min(work%long_p(l), work%long_r(l)), &
+                                   new_y, new_c, new_d, new_z)
+                call double_angle(work%long_nu(l), bg(l), y(l), z(l), new_s, new_c*new_d, new_z, new_ec, &
+                                  new_es)
                 y(l) = merge(new_y, y(l), squares(l) >= n)
                 z(l) = merge(new_z, z(l), squares(l) >= n)
                 s(l) = merge(new_s, s(l), squares(l) >= n)
@@ -288,9 +312,10 @@ contains
                 new_z = z(l)
                 new_ec = ec(l)
                 new_es = es(l)
-                call double_triple(max(work%p(l), work%r(l)), abs(delta(l)), new_s, new_c, new_d, new_z)
-                call double_angle(work%nu(l), bg(l), s(l)*s(l), z(l), new_s, new_c*new_d, new_z, new_ec, &
-                                  new_es)
+                call double_triple(max(work%long_p(l), work%long_r(l)), abs(delta(l)), new_s, new_c, new_d, &
+                                   new_z)
+                call double_angle(work%long_nu(l), bg(l), s(l)*s(l), z(l), new_s, new_c*new_d, new_z, &
+                                  new_ec, new_es)
                 s(l) = merge(new_s, s(l), triples(l) >= n)
                 c(l) = merge(new_c, c(l), triples(l) >= n)
                 d(l) = merge(new_d, d(l), triples(l) >= n)
