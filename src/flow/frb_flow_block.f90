@@ -23,9 +23,8 @@ module frb_flow_block
 
     !> What the loops of flow_block hand to one another, one number a lane.
     type :: workspace
-        real(wp) :: m1(lanes), m2(lanes), m3(lanes), gg(lanes)      !! momentum before the step, its square
+        real(wp) :: gg(lanes)                                       !! square of the momentum
         real(wp) :: a(lanes), b(lanes), g(lanes), p(lanes), r(lanes), nu(lanes), k(lanes)
-        real(wp) :: reach(lanes), square(lanes)                     !! max(p, r); square of the angle a1 t
         real(wp) :: form(lanes)                                     !! 1: first form, -1: its mirror image
         real(wp) :: long(lanes)                                     !! 1: beyond the short series, else 0
         real(wp) :: long_p(lanes), long_r(lanes), long_nu(lanes)    !! p, r, nu of long lanes, see sort_lanes
@@ -37,7 +36,8 @@ module frb_flow_block
 contains
 
     !> Advances the bodies of a block by 2 t: m, and q when `with_attitude`. `served` on entry: 1 for bodies
-    !> to advance; bodies out of reach come back with 0, unchanged. Bodies with 0 must hold finite numbers.
+    !> to advance; bodies out of reach come back with 0 and without their momentum. Bodies with 0 must hold
+    !> finite numbers.
     subroutine flow_block(bodies, t, with_attitude)
         type(block_of_bodies), intent(inout) :: bodies
         real(wp), intent(in) :: t
@@ -47,35 +47,28 @@ contains
         integer(int64) :: reach, square
         integer :: l, many_long
 
+        reach = 0_int64
+        square = 0_int64
         do l = 1, lanes
             work%a(l) = bodies%alpha(l)*t
             work%b(l) = bodies%beta(l)*t
             work%g(l) = bodies%gamma(l)*t
-            work%m1(l) = bodies%m(l, 1)
-            work%m2(l) = bodies%m(l, 2)
-            work%m3(l) = bodies%m(l, 3)
-            work%gg(l) = work%m1(l)**2 + work%m2(l)**2 + work%m3(l)**2
-            pt = work%b(l)*work%m1(l)**2 + work%a(l)*work%m2(l)**2
-            rt = work%g(l)*work%m2(l)**2 + work%b(l)*work%m3(l)**2
+            work%gg(l) = bodies%m(l, 1)**2 + bodies%m(l, 2)**2 + bodies%m(l, 3)**2
+            pt = work%b(l)*bodies%m(l, 1)**2 + work%a(l)*bodies%m(l, 2)**2
+            rt = work%g(l)*bodies%m(l, 2)**2 + work%b(l)*bodies%m(l, 3)**2
             work%p(l) = work%g(l)*pt
             work%r(l) = work%a(l)*rt
-            work%k(l) = work%a(l)*work%g(l)*work%m2(l)**2
+            work%k(l) = work%a(l)*work%g(l)*bodies%m(l, 2)**2
             ! Of the two mirror forms the one with the smaller parameter nu of the third kind.
             work%nu(l) = min(work%g(l)*rt, work%a(l)*pt)
             work%form(l) = merge(1.0_wp, -1.0_wp, work%g(l)*rt <= work%a(l)*pt)
-            work%reach(l) = max(work%p(l), work%r(l))
-            work%square(l) = (bodies%a1(l)*t)**2*work%gg(l)
-        end do
-        ! Largest of each; the bits of numbers >= 0 are ordered as the numbers are.
-        reach = 0_int64
-        square = 0_int64
-        do l = 1, lanes
-            reach = max(reach, transfer(work%reach(l), 0_int64))
-            square = max(square, transfer(work%square(l), 0_int64))
+            ! The largest of all lanes: the bits of numbers >= 0 are ordered as the numbers are.
+            reach = max(reach, transfer(max(work%p(l), work%r(l)), 0_int64))
+            square = max(square, transfer((bodies%a1(l)*t)**2*work%gg(l), 0_int64))
         end do
         many_long = 0
         if (reach > transfer(short_limit, 0_int64) .or. square > transfer(small_turn_limit, 0_int64)) then
-            call sort_lanes(bodies, work, many_long)
+            call sort_lanes(bodies, t, work, many_long)
         end if
         ! Lanes of all sorts in one block: each loop runs over all lanes, each lane takes its own result.
         call tiny_triple(with_attitude, work)
@@ -89,34 +82,36 @@ contains
             end do
         end if
         do l = 1, lanes
-            bodies%m(l, 1) = work%m1(l) + work%d1(l)
-            bodies%m(l, 2) = work%m2(l) + work%d2(l)
-            bodies%m(l, 3) = work%m3(l) + work%d3(l)
+            bodies%m(l, 1) = bodies%m(l, 1) + work%d1(l)
+            bodies%m(l, 2) = bodies%m(l, 2) + work%d2(l)
+            bodies%m(l, 3) = bodies%m(l, 3) + work%d3(l)
         end do
     end subroutine flow_block
 
     !> Tells long lanes and lanes out of reach. Long ones run through the routines for short steps with
     !> p = r = nu = k = 0, and those out of reach rest, so that no number overflows on the way.
-    subroutine sort_lanes(bodies, work, many_long)
+    subroutine sort_lanes(bodies, t, work, many_long)
         type(block_of_bodies), intent(inout) :: bodies
+        real(wp), intent(in) :: t
         type(workspace), intent(inout) :: work
         integer, intent(out) :: many_long
+        real(wp) :: reach, square
         integer :: l
 
         many_long = 0
         do l = 1, lanes
-            if (work%reach(l) > period_limit .or. work%square(l) > sin_cos_limit**2) bodies%served(l) = 0
+            reach = max(work%p(l), work%r(l))
+            square = (bodies%a1(l)*t)**2*work%gg(l)
+            if (reach > period_limit .or. square > sin_cos_limit**2) bodies%served(l) = 0
             work%long(l) = 0.0_wp
             if (bodies%served(l) == 0) then
-                work%m1(l) = 0.0_wp
-                work%m2(l) = 0.0_wp
-                work%m3(l) = 0.0_wp
+                bodies%m(l, :) = 0.0_wp
                 work%gg(l) = 0.0_wp
                 work%p(l) = 0.0_wp
                 work%r(l) = 0.0_wp
                 work%nu(l) = 0.0_wp
                 work%k(l) = 0.0_wp
-            else if (work%reach(l) > short_limit .or. work%square(l) > small_turn_limit) then
+            else if (reach > short_limit .or. square > small_turn_limit) then
                 work%long(l) = 1.0_wp
                 many_long = many_long + 1
             end if
@@ -174,22 +169,22 @@ contains
         real(wp), intent(in) :: t
         logical, intent(in) :: with_attitude
         type(workspace), intent(inout) :: work
-        real(wp) :: u(lanes), w(lanes), along(lanes), cosm1(lanes), first(lanes), last(lanes)
+        real(wp) :: u(lanes), w(lanes), along(lanes), cosm1(lanes)
         real(wp) :: a23(lanes), b31(lanes), g12(lanes), square(lanes), dot(lanes), v0(lanes)
         real(wp) :: w1(lanes), w2(lanes), w3(lanes)
-        real(wp) :: v2, v3, angle
+        real(wp) :: v2, v3, angle, first, last
         integer :: l
 
         do l = 1, lanes
-            a23(l) = work%a(l)*(work%m2(l)*work%m3(l))
-            b31(l) = work%b(l)*(work%m3(l)*work%m1(l))
-            g12(l) = work%g(l)*(work%m1(l)*work%m2(l))
+            a23(l) = work%a(l)*(bodies%m(l, 2)*bodies%m(l, 3))
+            b31(l) = work%b(l)*(bodies%m(l, 3)*bodies%m(l, 1))
+            g12(l) = work%g(l)*(bodies%m(l, 1)*bodies%m(l, 2))
             u(l) = work%p(l)*work%y(l)
             w(l) = work%r(l)*work%y(l)
         end do
         do l = 1, lanes
             call short_momentum(u(l), w(l), work%k(l)*(work%scd(l)*work%scd(l)), work%scd(l), &
-                                work%m1(l), work%m2(l), work%m3(l), a23(l), b31(l), g12(l), &
+                                bodies%m(l, 1), bodies%m(l, 2), bodies%m(l, 3), a23(l), b31(l), g12(l), &
                                 work%d1(l), work%d2(l), work%d3(l))
         end do
         if (.not. with_attitude) return
@@ -201,15 +196,15 @@ contains
         end do
         ! The mirror form is the first one with the axes (3, 2, 1).
         do l = 1, lanes
-            first(l) = merge(work%m1(l), work%m3(l), work%form(l) > 0.0_wp)
-            last(l) = merge(work%m3(l), work%m1(l), work%form(l) > 0.0_wp)
+            first = merge(bodies%m(l, 1), bodies%m(l, 3), work%form(l) > 0.0_wp)
+            last = merge(bodies%m(l, 3), bodies%m(l, 1), work%form(l) > 0.0_wp)
             call short_direction(work%b(l), merge(work%g(l), work%a(l), work%form(l) > 0.0_wp), &
                                  merge(w(l), u(l), work%form(l) > 0.0_wp), work%k(l)*work%y(l), work%y(l), &
-                                 work%scd(l), work%m2(l), last(l), b31(l), &
+                                 work%scd(l), bodies%m(l, 2), last, b31(l), &
                                  merge(g12(l), a23(l), work%form(l) > 0.0_wp), v0(l), v2, v3)
-            call join_turns(work%form(l)*(1 + cosm1(l)), along(l), first(l), work%m2(l), last(l), 1 + v0(l), &
+            call join_turns(work%form(l)*(1 + cosm1(l)), along(l), first, bodies%m(l, 2), last, 1 + v0(l), &
                             v2, v3, w1(l), w2(l), w3(l))
-            dot(l) = work%form(l)*along(l)*(work%m2(l)*v2 + last(l)*v3)
+            dot(l) = work%form(l)*along(l)*(bodies%m(l, 2)*v2 + last*v3)
             square(l) = v0(l)*(2 + v0(l)) + (v2*v2 + v3*v3)
         end do
         do l = 1, lanes
@@ -236,7 +231,7 @@ contains
         do l = 1, lanes
             bg(l) = work%b(l)*sqrt(work%gg(l))
             ! The parentheses keep this 0 on the separatrix with FMA too.
-            delta(l) = work%b(l)*((work%a(l)*work%m3(l)**2) - (work%g(l)*work%m1(l)**2))
+            delta(l) = work%b(l)*((work%a(l)*bodies%m(l, 3)**2) - (work%g(l)*bodies%m(l, 1)**2))
             f(l) = 1.0_wp
             triples(l) = 0.0_wp
             squares(l) = 0.0_wp
@@ -338,14 +333,14 @@ contains
             cp = merge(c(l), d(l), delta(l) <= 0.0_wp)
             dr = merge(d(l), c(l), delta(l) <= 0.0_wp)
             call long_momentum(delta(l) <= 0.0_wp, work%a(l), work%b(l), work%g(l), s(l), cp, dr, z(l), &
-                               work%m1(l), work%m2(l), work%m3(l), n1, n2, n3, n0, w1, w2, w3)
+                               bodies%m(l, 1), bodies%m(l, 2), bodies%m(l, 3), n1, n2, n3, n0, w1, w2, w3)
             work%d1(l) = merge(w1, work%d1(l), work%long(l) > 0.0_wp)
             work%d2(l) = merge(w2, work%d2(l), work%long(l) > 0.0_wp)
             work%d3(l) = merge(w3, work%d3(l), work%long(l) > 0.0_wp)
             if (with_attitude) then
                 form = work%form(l)
-                first = merge(work%m1(l), work%m3(l), form > 0.0_wp)
-                last = merge(work%m3(l), work%m1(l), form > 0.0_wp)
+                first = merge(bodies%m(l, 1), bodies%m(l, 3), form > 0.0_wp)
+                last = merge(bodies%m(l, 3), bodies%m(l, 1), form > 0.0_wp)
                 norm = sqrt(work%gg(l))
                 call sin_cos(norm*(merge(bodies%a1(l), bodies%a3(l), form > 0.0_wp)*t), sine, cosine)
                 along = (sine*ec(l) - form*cosine*es(l))/max(norm, tiny(1.0_wp))
@@ -353,8 +348,8 @@ contains
                 call long_direction(work%b(l), merge(work%g(l), work%a(l), form > 0.0_wp), s(l), &
                                     merge(dr, cp, form > 0.0_wp), z(l), n0, n2, &
                                     merge(n3, n1, form > 0.0_wp), v0, v2, v3)
-                call join_turns(form*cosine, along, first, work%m2(l), last, v0, v2, v3, w1, w2, w3)
-                e0 = cosine*v0 - form*along*(work%m2(l)*v2 + last*v3)
+                call join_turns(form*cosine, along, first, bodies%m(l, 2), last, v0, v2, v3, w1, w2, w3)
+                e0 = cosine*v0 - form*along*(bodies%m(l, 2)*v2 + last*v3)
                 call unit_turn(e0, w0, w1, w2, w3)
                 work%w0(l) = merge(w0, work%w0(l), work%long(l) > 0.0_wp)
                 work%w1(l) = merge(merge(w1, w3, form > 0.0_wp), work%w1(l), work%long(l) > 0.0_wp)
