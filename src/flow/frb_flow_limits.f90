@@ -12,7 +12,7 @@ module frb_flow_limits
     real(wp), parameter :: tiny_limit = 1.0e-4_wp       !! the same of the first terms alone
     real(wp), parameter :: tiny_turn_limit = 1.0e-3_wp  !! largest square of a half angle of the first terms
     real(wp), parameter :: small_turn_limit = 0.04_wp   !! largest square of a half angle of the short series
-    real(wp), parameter :: middle_limit = 0.03_wp       !! the same of the middle series, of doubling
+    real(wp), parameter :: middle_limit = 0.03_wp       !! largest max(P, R) t^2 of the middle series
     real(wp), parameter :: middle_turn_limit = 0.6_wp   !! largest square of a half angle of the middle series
     real(wp), parameter :: square_limit = 0.6_wp        !! largest max(P, R) t^2 to which s^2 alone is doubled
     real(wp), parameter :: period_limit = 1024.0_wp     !! max(P, R) (h/2)^2 from which periods are taken out

@@ -1,5 +1,5 @@
-!> Steps of one body beyond the short series: s^2 by its series at a fraction of the time and doublings, many
-!> periods by the arithmetic-geometric mean.
+!> Steps of one body beyond the series of frb_flow_one: s^2 by its series at a fraction of the time and
+!> doublings, many periods by the arithmetic-geometric mean.
 module frb_flow_long
     use frb_flow_limits, only: middle_limit, square_limit, period_limit, smallest_denominator, sin_cos_limit
     use frb_flow_periods, only: reduce_periods
@@ -73,7 +73,7 @@ contains
         es = 0.0_wp
         if (with_attitude) then
             s = sqrt(y)
-            call base_angle(p, r, nu, bg, s, y, ec, es)
+            call base_angle(bg*(nu*y)*s*middle_third_kind(p*y, r*y, nu*y), ec, es)
         end if
         c = sqrt(1 - pmax*y)
         d = sqrt(1 - pmin*y)

@@ -71,13 +71,16 @@ contains
     !> The same body into all lanes.
     pure subroutine set_body(body, bodies)
         type(rigid_body), intent(in) :: body
-        type(block_of_bodies), intent(inout) :: bodies
+        type(block_of_bodies), intent(out) :: bodies
 
         bodies%alpha = body%alpha
         bodies%beta = body%beta
         bodies%gamma = body%gamma
         bodies%a1 = body%a(1)
         bodies%a3 = body%a(3)
+        bodies%m = 0.0_wp
+        bodies%q = 0.0_wp
+        bodies%served = 0
     end subroutine set_body
 
     !> Advances `lanes` equal bodies if all are plain; else, served = .false., they are left as they are.
@@ -141,25 +144,26 @@ contains
         bodies%q(:, 3) = -bodies%q(:, 3)
     end subroutine reflect
 
-    !> Whether all vectors (x1, x2, x3, x4) hold plain numbers. The bits of a number without its sign are
-    !> ordered as its size is, with Inf and NaN above all; comparing them raises no exception.
+    !> Whether the largest component of every vector (x1, x2, x3, x4) is a plain number. The bits of a number
+    !> without its sign are ordered as its size is, with Inf and NaN above all; comparing them raises no
+    !> exception.
     pure function all_plain(x1, x2, x3, x4) result(plain)
-        real(wp), intent(in) :: x1(lanes), x2(lanes), x3(lanes)
-        real(wp), intent(in), optional :: x4(lanes)
+        real(wp), intent(in) :: x1(:), x2(:), x3(:)
+        real(wp), intent(in), optional :: x4(:)
         logical :: plain
         integer(int64), parameter :: without_sign = huge(0_int64)
-        integer(int64) :: largest, smallest, size
+        integer(int64) :: largest, smallest, most
         integer :: l
 
         largest = 0_int64
         smallest = huge(0_int64)
-        do l = 1, lanes
-            size = max(iand(transfer(x1(l), 0_int64), without_sign), &
+        do l = 1, size(x1)
+            most = max(iand(transfer(x1(l), 0_int64), without_sign), &
                        iand(transfer(x2(l), 0_int64), without_sign), &
                        iand(transfer(x3(l), 0_int64), without_sign))
-            if (present(x4)) size = max(size, iand(transfer(x4(l), 0_int64), without_sign))
-            largest = max(largest, size)
-            smallest = min(smallest, size)
+            if (present(x4)) most = max(most, iand(transfer(x4(l), 0_int64), without_sign))
+            largest = max(largest, most)
+            smallest = min(smallest, most)
         end do
         plain = largest < transfer(plain_largest, 0_int64) .and. smallest > transfer(plain_smallest, 0_int64)
     end function all_plain
@@ -221,18 +225,13 @@ contains
         integer, intent(in) :: l
         logical, intent(in) :: with_attitude
         logical :: plain
-        real(wp) :: size_m, size_q
 
         plain = one%status == status_ok .and. .not. one%turned
         if (.not. plain) return
-        size_m = sum(0.01_wp*abs(bodies%m(l, :)))
-        plain = ieee_is_finite(size_m)
-        if (plain) plain = size_m < plain_largest .and. size_m > plain_smallest
+        plain = all_plain(bodies%m(l:l, 1), bodies%m(l:l, 2), bodies%m(l:l, 3))
         if (plain) plain = is_plain_time(one, h)
         if (plain .and. with_attitude) then
-            size_q = sum(0.01_wp*abs(bodies%q(l, :)))
-            plain = ieee_is_finite(size_q)
-            if (plain) plain = size_q < plain_largest .and. size_q > plain_smallest
+            plain = all_plain(bodies%q(l:l, 0), bodies%q(l:l, 1), bodies%q(l:l, 2), bodies%q(l:l, 3))
         end if
     end function lane_is_plain
 

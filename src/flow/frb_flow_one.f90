@@ -1,5 +1,5 @@
 !> The free flow of one body, in its principal axes. One case distinction only, on the length of the step:
-!> short ones by series, here; longer ones by doubling, in frb_flow_long.
+!> short and middle ones by series, here; longer ones by doubling, in frb_flow_long.
 !>
 !> Closed form: m by the addition theorem of the elliptic functions written in m itself; attitude q e z with e
 !> a rotation about m by an angle with one integral of the third kind, z algebraic. Updates are increments.
@@ -165,7 +165,7 @@ contains
         case (short_step)
             change = short_norm(square)
         case default
-            change = -square/(sqrt(1 + square)*(1 + sqrt(1 + square)))
+            change = middle_norm(square)
         end select
         call small_unit_turn(cosm1, v0, dot, change, w0, w1, w2, w3)
         q3 = body%parity*q(1 + i3)
@@ -181,23 +181,6 @@ contains
         sinc = (1 - xx*(1/6.0_wp)) + (xx*xx)*(1/120.0_wp - xx*(1/5040.0_wp))
         cosm1 = -xx*((0.5_wp - xx*(1/24.0_wp)) + (xx*xx)*(1/720.0_wp - xx*(1/40320.0_wp)))
     end subroutine tiny_turn
-
-    !> sin(x)/x and cos(x) - 1 from xx = x^2 <= middle_turn_limit, to rounding.
-    pure subroutine middle_turn(xx, sinc, cosm1)
-        real(wp), intent(in) :: xx
-        real(wp), intent(out) :: sinc, cosm1
-        real(wp) :: x4, x8
-
-        x4 = xx*xx
-        x8 = x4*x4
-        sinc = (((1 - xx*(1/6.0_wp)) + x4*(1/120.0_wp - xx*(1/5040.0_wp))) &
-                + x8*((1/362880.0_wp - xx*(1/39916800.0_wp)) &
-                      + x4*(1/6227020800.0_wp - xx*(1/1307674368000.0_wp)))) &
-               + (x8*x8)*(1/355687428096000.0_wp)
-        cosm1 = -xx*(((0.5_wp - xx*(1/24.0_wp)) + x4*(1/720.0_wp - xx*(1/40320.0_wp))) &
-                     + x8*((1/3628800.0_wp - xx*(1/479001600.0_wp)) &
-                           + x4*(1/87178291200.0_wp - xx*(1/20922789888000.0_wp))))
-    end subroutine middle_turn
 
     !> First terms of short_norm.
     pure function tiny_norm(square) result(change)
