@@ -72,6 +72,7 @@ contains
         if (reach > transfer(middle_limit, 0_int64) .or. square > transfer(middle_turn_limit, 0_int64)) then
             call sort_lanes(bodies, t, work, many_long)
         end if
+        if (many_long > 0 .and. .not. with_attitude) work%third = 0.0_wp
         ! Lanes of all sorts in one block: each loop runs over all lanes, each lane takes its own result.
         call tiny_triple(with_attitude, work)
         if (reach > transfer(tiny_limit, 0_int64)) call short_triple(with_attitude, work)
@@ -171,7 +172,6 @@ contains
             p = work%p(l)
             r = work%r(l)
             call tiny_series(p + r, p*r, work%y(l), work%scd(l))
-            work%third(l) = 0.0_wp
             if (with_attitude) work%third(l) = tiny_third_kind(p + r, p*r, work%nu(l))
         end do
     end subroutine tiny_triple
@@ -227,7 +227,7 @@ contains
         real(wp) :: u(lanes), w(lanes), along(lanes), cosm1(lanes)
         real(wp) :: a23(lanes), b31(lanes), g12(lanes), square(lanes), dot(lanes), v0(lanes)
         real(wp) :: w1(lanes), w2(lanes), w3(lanes)
-        real(wp) :: angle(lanes), xx(lanes), change(lanes), v2, v3, sinc, cosine, first, last
+        real(wp) :: change, v2, v3, angle, xx, sinc, cosine, first, last
         integer :: l
 
         do l = 1, lanes
@@ -244,19 +244,19 @@ contains
         end do
         if (.not. with_attitude) return
         do l = 1, lanes
-            angle(l) = merge(bodies%a1(l), bodies%a3(l), work%form(l) > 0.0_wp)*t &
-                       - work%form(l)*work%b(l)*(work%nu(l)*work%third(l))
-            xx(l) = angle(l)*angle(l)*work%gg(l)
-        end do
-        do l = 1, lanes
-            call small_turn(xx(l), sinc, cosm1(l))
-            along(l) = angle(l)*sinc
+            angle = merge(bodies%a1(l), bodies%a3(l), work%form(l) > 0.0_wp)*t &
+                    - work%form(l)*work%b(l)*(work%nu(l)*work%third(l))
+            call small_turn(angle*angle*work%gg(l), along(l), cosm1(l))
+            along(l) = angle*along(l)
         end do
         if (some_middle_turns) then
             do l = 1, lanes
-                call middle_turn(xx(l), sinc, cosine)
-                cosm1(l) = merge(cosm1(l), cosine, xx(l) <= small_turn_limit)
-                along(l) = merge(along(l), angle(l)*sinc, xx(l) <= small_turn_limit)
+                angle = merge(bodies%a1(l), bodies%a3(l), work%form(l) > 0.0_wp)*t &
+                        - work%form(l)*work%b(l)*(work%nu(l)*work%third(l))
+                xx = angle*angle*work%gg(l)
+                call middle_turn(xx, sinc, cosine)
+                cosm1(l) = merge(cosm1(l), cosine, xx <= small_turn_limit)
+                along(l) = merge(along(l), angle*sinc, xx <= small_turn_limit)
             end do
         end if
         ! The mirror form is the first one with the axes (3, 2, 1).
@@ -273,15 +273,10 @@ contains
             square(l) = v0(l)*(2 + v0(l)) + (v2*v2 + v3*v3)
         end do
         do l = 1, lanes
-            change(l) = short_norm(square(l))
-        end do
-        if (some_middle) then
-            do l = 1, lanes
-                change(l) = merge(change(l), middle_norm(square(l)), max(work%p(l), work%r(l)) <= short_limit)
-            end do
-        end if
-        do l = 1, lanes
-            call small_unit_turn(cosm1(l), v0(l), dot(l), change(l), work%w0(l), w1(l), w2(l), w3(l))
+            change = short_norm(square(l))
+            if (some_middle) change = merge(change, middle_norm(square(l)), &
+                                            max(work%p(l), work%r(l)) <= short_limit)
+            call small_unit_turn(cosm1(l), v0(l), dot(l), change, work%w0(l), w1(l), w2(l), w3(l))
             work%w1(l) = merge(w1(l), w3(l), work%form(l) > 0.0_wp)
             work%w2(l) = w2(l)
             work%w3(l) = merge(w3(l), w1(l), work%form(l) > 0.0_wp)

@@ -144,29 +144,41 @@ contains
         bodies%q(:, 3) = -bodies%q(:, 3)
     end subroutine reflect
 
-    !> Whether the largest component of every vector (x1, x2, x3, x4) is a plain number. The bits of a number
-    !> without its sign are ordered as its size is, with Inf and NaN above all; comparing them raises no
-    !> exception.
+    !> Whether the largest component of every vector (x1, x2, x3, x4) is a plain number.
     pure function all_plain(x1, x2, x3, x4) result(plain)
-        real(wp), intent(in) :: x1(:), x2(:), x3(:)
-        real(wp), intent(in), optional :: x4(:)
+        real(wp), intent(in) :: x1(lanes), x2(lanes), x3(lanes)
+        real(wp), intent(in), optional :: x4(lanes)
         logical :: plain
-        integer(int64), parameter :: without_sign = huge(0_int64)
         integer(int64) :: largest, smallest, most
         integer :: l
 
         largest = 0_int64
         smallest = huge(0_int64)
-        do l = 1, size(x1)
-            most = max(iand(transfer(x1(l), 0_int64), without_sign), &
-                       iand(transfer(x2(l), 0_int64), without_sign), &
-                       iand(transfer(x3(l), 0_int64), without_sign))
-            if (present(x4)) most = max(most, iand(transfer(x4(l), 0_int64), without_sign))
+        do l = 1, lanes
+            most = max(magnitude(x1(l)), magnitude(x2(l)), magnitude(x3(l)))
+            if (present(x4)) most = max(most, magnitude(x4(l)))
             largest = max(largest, most)
             smallest = min(smallest, most)
         end do
-        plain = largest < transfer(plain_largest, 0_int64) .and. smallest > transfer(plain_smallest, 0_int64)
+        plain = are_plain(smallest, largest)
     end function all_plain
+
+    !> The bits of a number without its sign: ordered as its size is, with Inf and NaN above all. Comparing
+    !> them raises no exception.
+    elemental function magnitude(x) result(bits)
+        real(wp), intent(in) :: x
+        integer(int64) :: bits
+
+        bits = iand(transfer(x, 0_int64), huge(0_int64))
+    end function magnitude
+
+    !> Whether magnitudes from the smallest to the largest are those of plain numbers.
+    pure function are_plain(smallest, largest) result(plain)
+        integer(int64), intent(in) :: smallest, largest
+        logical :: plain
+
+        plain = largest < transfer(plain_largest, 0_int64) .and. smallest > transfer(plain_smallest, 0_int64)
+    end function are_plain
 
     !> Bodies first to last into the lanes of a block, in sorted axes; lanes that hold no plain state rest.
     subroutine load_block(body, different, count, h, m, bodies, q)
@@ -225,13 +237,15 @@ contains
         integer, intent(in) :: l
         logical, intent(in) :: with_attitude
         logical :: plain
+        integer(int64) :: most
 
         plain = one%status == status_ok .and. .not. one%turned
         if (.not. plain) return
-        plain = all_plain(bodies%m(l:l, 1), bodies%m(l:l, 2), bodies%m(l:l, 3))
-        if (plain) plain = is_plain_time(one, h)
+        most = maxval(magnitude(bodies%m(l, :)))
+        plain = are_plain(most, most) .and. is_plain_time(one, h)
         if (plain .and. with_attitude) then
-            plain = all_plain(bodies%q(l:l, 0), bodies%q(l:l, 1), bodies%q(l:l, 2), bodies%q(l:l, 3))
+            most = maxval(magnitude(bodies%q(l, :)))
+            plain = are_plain(most, most)
         end if
     end function lane_is_plain
 
