@@ -3,8 +3,8 @@
 !> its block, so results are the same for any split of the bodies. A body that is out of reach (many periods
 !> in one step, extreme exponents, refused input) is left to the routine for one body.
 module frb_flow_block
-    use frb_flow_limits, only: tiny_limit, short_limit, small_turn_limit, middle_limit, &
-        middle_turn_limit, square_limit, period_limit, smallest_denominator, sin_cos_limit
+    use frb_flow_limits, only: tiny_limit, short_limit, small_turn_limit, middle_limit, square_limit, &
+        period_limit, smallest_denominator, sin_cos_limit
     use frb_kinds, only: wp
     use, intrinsic :: iso_fortran_env, only: int64
     implicit none
@@ -26,10 +26,8 @@ module frb_flow_block
         real(wp) :: gg(lanes)                                       !! square of the momentum
         real(wp) :: a(lanes), b(lanes), g(lanes), p(lanes), r(lanes), nu(lanes), k(lanes)
         real(wp) :: form(lanes)                                     !! 1: first form, -1: its mirror image
-        real(wp) :: long(lanes)                                     !! 1: beyond the middle series, else 0
+        real(wp) :: long(lanes)                                     !! 1: beyond the short series, else 0
         real(wp) :: long_p(lanes), long_r(lanes), long_nu(lanes)    !! p, r, nu of long lanes, see sort_lanes
-        real(wp) :: f(lanes)                                        !! part of the time where doubling starts
-        real(wp) :: squares(lanes), triples(lanes)                  !! numbers of doublings
         real(wp) :: y(lanes), scd(lanes), third(lanes)              !! s^2, s c d, H of short steps
         real(wp) :: d1(lanes), d2(lanes), d3(lanes)                 !! increments of the momentum
         real(wp) :: w0(lanes), w1(lanes), w2(lanes), w3(lanes)      !! the turn e z - 1
@@ -69,16 +67,13 @@ contains
             square = max(square, transfer((bodies%a1(l)*t)**2*work%gg(l), 0_int64))
         end do
         many_long = 0
-        if (reach > transfer(middle_limit, 0_int64) .or. square > transfer(middle_turn_limit, 0_int64)) then
+        if (reach > transfer(short_limit, 0_int64) .or. square > transfer(small_turn_limit, 0_int64)) then
             call sort_lanes(bodies, t, work, many_long)
         end if
-        if (many_long > 0 .and. .not. with_attitude) work%third = 0.0_wp
         ! Lanes of all sorts in one block: each loop runs over all lanes, each lane takes its own result.
         call tiny_triple(with_attitude, work)
         if (reach > transfer(tiny_limit, 0_int64)) call short_triple(with_attitude, work)
-        if (reach > transfer(short_limit, 0_int64)) call middle_triple(with_attitude, work)
-        call short_steps(bodies, t, with_attitude, work, reach > transfer(short_limit, 0_int64), &
-                         square > transfer(small_turn_limit, 0_int64))
+        call short_steps(bodies, t, with_attitude, work)
         if (many_long > 0) call long_steps(bodies, t, with_attitude, work)
         if (with_attitude) then
             do l = 1, lanes
@@ -93,16 +88,15 @@ contains
         end do
     end subroutine flow_block
 
-    !> Tells long lanes and lanes out of reach. Long ones run through the routines for short steps with p, r
-    !> and nu of the part of the time where their doubling starts, and k = 0; each has its own numbers of
-    !> doublings. Those out of reach rest, so that no number overflows on the way.
+    !> Tells long lanes and lanes out of reach. Long ones run through the routines for short steps with
+    !> p = r = nu = k = 0, and those out of reach rest, so that no number overflows on the way.
     subroutine sort_lanes(bodies, t, work, many_long)
         type(block_of_bodies), intent(inout) :: bodies
         real(wp), intent(in) :: t
         type(workspace), intent(inout) :: work
         integer, intent(out) :: many_long
-        real(wp) :: reach, square, n
-        integer :: over, l
+        real(wp) :: reach, square
+        integer :: l
 
         many_long = 0
         do l = 1, lanes
@@ -117,7 +111,7 @@ contains
                 work%r(l) = 0.0_wp
                 work%nu(l) = 0.0_wp
                 work%k(l) = 0.0_wp
-            else if (reach > middle_limit .or. square > middle_turn_limit) then
+            else if (reach > short_limit .or. square > small_turn_limit) then
                 work%long(l) = 1.0_wp
                 many_long = many_long + 1
             end if
@@ -126,38 +120,10 @@ contains
             work%long_p(l) = work%p(l)
             work%long_r(l) = work%r(l)
             work%long_nu(l) = work%nu(l)
+            work%p(l) = merge(work%p(l), 0.0_wp, work%long(l) <= 0.0_wp)
+            work%r(l) = merge(work%r(l), 0.0_wp, work%long(l) <= 0.0_wp)
+            work%nu(l) = merge(work%nu(l), 0.0_wp, work%long(l) <= 0.0_wp)
             work%k(l) = merge(work%k(l), 0.0_wp, work%long(l) <= 0.0_wp)
-            work%f(l) = 1.0_wp
-            work%triples(l) = 0.0_wp
-            work%squares(l) = 0.0_wp
-        end do
-        if (many_long == 0) return
-        do
-            over = 0
-            do l = 1, lanes
-                n = max(work%p(l), work%r(l))*work%f(l)*work%f(l)
-                n = merge(1.0_wp, 0.0_wp, n > square_limit)
-                work%triples(l) = work%triples(l) + n
-                work%f(l) = work%f(l)*(1 - 0.5_wp*n)
-                over = over + merge(1, 0, n > 0.0_wp)
-            end do
-            if (over == 0) exit
-        end do
-        do
-            over = 0
-            do l = 1, lanes
-                n = max(work%p(l), work%r(l))*work%f(l)*work%f(l)       ! nu is never larger
-                n = merge(1.0_wp, 0.0_wp, n > middle_limit)
-                work%squares(l) = work%squares(l) + n
-                work%f(l) = work%f(l)*(1 - 0.5_wp*n)
-                over = over + merge(1, 0, n > 0.0_wp)
-            end do
-            if (over == 0) exit
-        end do
-        do l = 1, lanes
-            work%p(l) = work%p(l)*(work%f(l)*work%f(l))
-            work%r(l) = work%r(l)*(work%f(l)*work%f(l))
-            work%nu(l) = work%nu(l)*(work%f(l)*work%f(l))
         end do
     end subroutine sort_lanes
 
@@ -196,38 +162,17 @@ contains
         end do
     end subroutine short_triple
 
-    !> The same for lanes of middle length.
-    subroutine middle_triple(with_attitude, work)
-        logical, intent(in) :: with_attitude
-        type(workspace), intent(inout) :: work
-        real(wp) :: p, r, y, scd, third
-        integer :: l
-
-        do l = 1, lanes
-            p = work%p(l)
-            r = work%r(l)
-            call middle_series(p + r, p*r, y, scd)
-            if (with_attitude) then
-                third = y*sqrt(y)*middle_third_kind(p*y, r*y, work%nu(l)*y)
-                work%third(l) = merge(work%third(l), third, max(p, r) <= short_limit)
-            end if
-            work%y(l) = merge(work%y(l), y, max(p, r) <= short_limit)
-            work%scd(l) = merge(work%scd(l), scd, max(p, r) <= short_limit)
-        end do
-    end subroutine middle_triple
-
-    !> Short and middle steps: increments of m; the turn when `with_attitude`. Several small loops: the
-    !> processor then works on all vectors of a block at a time, and constants stay in registers.
-    subroutine short_steps(bodies, t, with_attitude, work, some_middle, some_middle_turns)
+    !> Short steps: increments of m; the turn when `with_attitude`. Several small loops: the processor then
+    !> works on all vectors of a block at a time, and constants stay in registers.
+    subroutine short_steps(bodies, t, with_attitude, work)
         type(block_of_bodies), intent(in) :: bodies
         real(wp), intent(in) :: t
         logical, intent(in) :: with_attitude
         type(workspace), intent(inout) :: work
-        logical, intent(in) :: some_middle, some_middle_turns   ! lanes beyond short_limit, small_turn_limit
         real(wp) :: u(lanes), w(lanes), along(lanes), cosm1(lanes)
         real(wp) :: a23(lanes), b31(lanes), g12(lanes), square(lanes), dot(lanes), v0(lanes)
         real(wp) :: w1(lanes), w2(lanes), w3(lanes)
-        real(wp) :: change, v2, v3, angle, xx, sinc, cosine, first, last
+        real(wp) :: v2, v3, angle, first, last
         integer :: l
 
         do l = 1, lanes
@@ -249,16 +194,6 @@ contains
             call small_turn(angle*angle*work%gg(l), along(l), cosm1(l))
             along(l) = angle*along(l)
         end do
-        if (some_middle_turns) then
-            do l = 1, lanes
-                angle = merge(bodies%a1(l), bodies%a3(l), work%form(l) > 0.0_wp)*t &
-                        - work%form(l)*work%b(l)*(work%nu(l)*work%third(l))
-                xx = angle*angle*work%gg(l)
-                call middle_turn(xx, sinc, cosine)
-                cosm1(l) = merge(cosm1(l), cosine, xx <= small_turn_limit)
-                along(l) = merge(along(l), angle*sinc, xx <= small_turn_limit)
-            end do
-        end if
         ! The mirror form is the first one with the axes (3, 2, 1).
         do l = 1, lanes
             first = merge(bodies%m(l, 1), bodies%m(l, 3), work%form(l) > 0.0_wp)
@@ -273,42 +208,74 @@ contains
             square(l) = v0(l)*(2 + v0(l)) + (v2*v2 + v3*v3)
         end do
         do l = 1, lanes
-            change = short_norm(square(l))
-            if (some_middle) change = merge(change, middle_norm(square(l)), &
-                                            max(work%p(l), work%r(l)) <= short_limit)
-            call small_unit_turn(cosm1(l), v0(l), dot(l), change, work%w0(l), w1(l), w2(l), w3(l))
+            call small_unit_turn(cosm1(l), v0(l), dot(l), short_norm(square(l)), work%w0(l), w1(l), &
+                                 w2(l), w3(l))
             work%w1(l) = merge(w1(l), w3(l), work%form(l) > 0.0_wp)
             work%w2(l) = w2(l)
             work%w3(l) = merge(w3(l), w1(l), work%form(l) > 0.0_wp)
         end do
     end subroutine short_steps
 
-    !> Steps of lanes beyond the middle series, by doubling; others keep what they have. The angle is doubled
-    !> with and without attitude: a condition inside would keep the loops out of the lanes.
+    !> Steps of lanes beyond the short series, by doubling; others keep what they have.
     subroutine long_steps(bodies, t, with_attitude, work)
         type(block_of_bodies), intent(in) :: bodies
         real(wp), intent(in) :: t
         logical, intent(in) :: with_attitude
         type(workspace), intent(inout) :: work
         real(wp) :: s(lanes), y(lanes), z(lanes), c(lanes), d(lanes), ec(lanes), es(lanes)
-        real(wp) :: delta(lanes), bg(lanes)
+        real(wp) :: delta(lanes), bg(lanes), f(lanes), triples(lanes), squares(lanes)
         real(wp) :: norm, n0, n1, n2, n3, cp, dr, sine, cosine, along, n, v0, v2, v3, e0, form, first, last
         real(wp) :: new_y, new_z, new_s, new_c, new_d, new_ec, new_es, w0, w1, w2, w3
-        integer :: most_triples, most_squares, i, l
+        integer :: most_triples, most_squares, over, i, l
 
         do l = 1, lanes
             bg(l) = work%b(l)*sqrt(work%gg(l))
             ! The parentheses keep this 0 on the separatrix with FMA too.
             delta(l) = work%b(l)*((work%a(l)*bodies%m(l, 3)**2) - (work%g(l)*bodies%m(l, 1)**2))
-            y(l) = work%y(l)*(work%f(l)*work%f(l))
+            f(l) = 1.0_wp
+            triples(l) = 0.0_wp
+            squares(l) = 0.0_wp
+        end do
+        ! Each body has its own numbers of doublings; the loops run to the largest of them.
+        most_triples = 0
+        do
+            over = 0
+            do l = 1, lanes
+                n = max(work%long_p(l), work%long_r(l))*f(l)*f(l)
+                n = merge(1.0_wp, 0.0_wp, work%long(l) > 0.0_wp .and. n > square_limit)
+                triples(l) = triples(l) + n
+                f(l) = f(l)*(1 - 0.5_wp*n)
+                over = over + merge(1, 0, n > 0.0_wp)
+            end do
+            if (over == 0) exit
+            most_triples = most_triples + 1
+        end do
+        most_squares = 0
+        do
+            over = 0
+            do l = 1, lanes
+                n = max(work%long_p(l), work%long_r(l))*f(l)*f(l)     ! nu is never larger
+                n = merge(1.0_wp, 0.0_wp, work%long(l) > 0.0_wp .and. n > middle_limit)
+                squares(l) = squares(l) + n
+                f(l) = f(l)*(1 - 0.5_wp*n)
+                over = over + merge(1, 0, n > 0.0_wp)
+            end do
+            if (over == 0) exit
+            most_squares = most_squares + 1
+        end do
+        do l = 1, lanes
+            n = f(l)*f(l)
+            call middle_series((work%long_p(l) + work%long_r(l))*n, work%long_p(l)*work%long_r(l)*(n*n), &
+                               y(l), new_y)
+            y(l) = y(l)*n
             s(l) = sqrt(y(l))
-            call base_angle(bg(l)*work%nu(l)*(work%f(l)*work%third(l)), ec(l), es(l))
+            n = work%long_nu(l)*y(l)
+            call base_angle(bg(l)*n*s(l)*middle_third_kind(work%long_p(l)*y(l), work%long_r(l)*y(l), n), &
+                            ec(l), es(l))
             c(l) = sqrt(1 - max(work%long_p(l), work%long_r(l))*y(l))
             d(l) = sqrt(1 - min(work%long_p(l), work%long_r(l))*y(l))
             z(l) = 1.0_wp
         end do
-        most_squares = nint(maxval(work%squares))
-        most_triples = nint(maxval(work%triples))
         do i = 1, most_squares
             n = real(i, wp)
             do l = 1, lanes
@@ -321,13 +288,13 @@ contains
                                    new_y, new_c, new_d, new_z)
                 call double_angle(work%long_nu(l), bg(l), y(l), z(l), new_s, new_c*new_d, new_z, new_ec, &
                                   new_es)
-                y(l) = merge(new_y, y(l), work%squares(l) >= n)
-                z(l) = merge(new_z, z(l), work%squares(l) >= n)
-                s(l) = merge(new_s, s(l), work%squares(l) >= n)
-                c(l) = merge(new_c, c(l), work%squares(l) >= n)
-                d(l) = merge(new_d, d(l), work%squares(l) >= n)
-                ec(l) = merge(new_ec, ec(l), work%squares(l) >= n)
-                es(l) = merge(new_es, es(l), work%squares(l) >= n)
+                y(l) = merge(new_y, y(l), squares(l) >= n)
+                z(l) = merge(new_z, z(l), squares(l) >= n)
+                s(l) = merge(new_s, s(l), squares(l) >= n)
+                c(l) = merge(new_c, c(l), squares(l) >= n)
+                d(l) = merge(new_d, d(l), squares(l) >= n)
+                ec(l) = merge(new_ec, ec(l), squares(l) >= n)
+                es(l) = merge(new_es, es(l), squares(l) >= n)
             end do
         end do
         do l = 1, lanes
@@ -346,12 +313,12 @@ contains
                                    new_z)
                 call double_angle(work%long_nu(l), bg(l), s(l)*s(l), z(l), new_s, new_c*new_d, new_z, &
                                   new_ec, new_es)
-                s(l) = merge(new_s, s(l), work%triples(l) >= n)
-                c(l) = merge(new_c, c(l), work%triples(l) >= n)
-                d(l) = merge(new_d, d(l), work%triples(l) >= n)
-                z(l) = merge(new_z, z(l), work%triples(l) >= n)
-                ec(l) = merge(new_ec, ec(l), work%triples(l) >= n)
-                es(l) = merge(new_es, es(l), work%triples(l) >= n)
+                s(l) = merge(new_s, s(l), triples(l) >= n)
+                c(l) = merge(new_c, c(l), triples(l) >= n)
+                d(l) = merge(new_d, d(l), triples(l) >= n)
+                z(l) = merge(new_z, z(l), triples(l) >= n)
+                ec(l) = merge(new_ec, ec(l), triples(l) >= n)
+                es(l) = merge(new_es, es(l), triples(l) >= n)
             end do
             do l = 1, lanes
                 n = merge(1/z(l), 1.0_wp, z(l) < smallest_denominator)

@@ -182,6 +182,33 @@ contains
         cosm1 = -xx*((0.5_wp - xx*(1/24.0_wp)) + (xx*xx)*(1/720.0_wp - xx*(1/40320.0_wp)))
     end subroutine tiny_turn
 
+    !> sin(x)/x and cos(x) - 1 from xx = x^2 <= middle_turn_limit, to rounding.
+    pure subroutine middle_turn(xx, sinc, cosm1)
+        real(wp), intent(in) :: xx
+        real(wp), intent(out) :: sinc, cosm1
+        real(wp) :: x4, x8
+
+        x4 = xx*xx
+        x8 = x4*x4
+        sinc = (((1 - xx*(1/6.0_wp)) + x4*(1/120.0_wp - xx*(1/5040.0_wp))) &
+                + x8*((1/362880.0_wp - xx*(1/39916800.0_wp)) &
+                      + x4*(1/6227020800.0_wp - xx*(1/1307674368000.0_wp)))) &
+               + (x8*x8)*(1/355687428096000.0_wp)
+        cosm1 = -xx*(((0.5_wp - xx*(1/24.0_wp)) + x4*(1/720.0_wp - xx*(1/40320.0_wp))) &
+                     + x8*((1/3628800.0_wp - xx*(1/479001600.0_wp)) &
+                           + x4*(1/87178291200.0_wp - xx*(1/20922789888000.0_wp))))
+    end subroutine middle_turn
+
+    !> As short_norm, for steps of middle length.
+    pure function middle_norm(square) result(change)
+        real(wp), intent(in) :: square
+        real(wp) :: change
+        real(wp) :: root
+
+        root = sqrt(1 + square)
+        change = -square/(root*(1 + root))
+    end function middle_norm
+
     !> First terms of short_norm.
     pure function tiny_norm(square) result(change)
         real(wp), intent(in) :: square
