@@ -361,7 +361,8 @@ contains
             last = min(first + 6, n)
             call free_flow(bodies(1), 1.0e74_wp, m2(:, first:last), q2(:, first:last), stat)
         end do
-        call t%ok('smallest-numbers-give-the-same-bits-however-split', same([m2], [m1]) .and. same([q2], [q1]))
+        call t%ok('smallest-numbers-give-the-same-bits-however-split', &
+                  same([m2], [m1]) .and. same([q2], [q1]))
     end subroutine check_splits
 
     !> Any body, momentum and step: moments over 12 decades, symmetric and nearly so; momenta next to axes and
