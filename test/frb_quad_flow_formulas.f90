@@ -7,8 +7,8 @@ module frb_quad_flow_formulas
     public :: wp, tiny_series, tiny_third_kind, short_series, short_momentum, short_direction
     public :: short_third_kind, small_turn, short_norm
     public :: small_unit_turn, middle_series, middle_third_kind
-    public :: double_square, double_triple
-    public :: base_angle, double_angle, long_momentum, long_direction, sin_cos, join_turns, turn, unit_turn
+    public :: orbit_difference, double_square, double_triple
+    public :: base_angle, double_angle, long_momentum, long_direction, sin_cos, join_turns, turn
 
 contains
 

@@ -14,10 +14,10 @@ module frb_flow_limits
     real(wp), parameter :: small_turn_limit = 0.04_wp   !! largest square of a half angle of the short series
     real(wp), parameter :: middle_limit = 0.03_wp       !! largest max(P, R) t^2 of the middle series
     real(wp), parameter :: middle_turn_limit = 0.6_wp   !! largest square of a half angle of the middle series
-    real(wp), parameter :: square_limit = 0.6_wp        !! largest max(P, R) t^2 to which s^2 alone is doubled
+    real(wp), parameter :: square_limit = 0.8_wp        !! largest max(P, R) t^2 to which s^2 alone is doubled
     real(wp), parameter :: period_limit = 1024.0_wp     !! max(P, R) (h/2)^2 from which periods are taken out
     real(wp), parameter :: smallest_denominator = 1.0e-9_wp    !! of the triple before it is formed anew
-    real(wp), parameter :: sin_cos_limit = 1.0e5_wp     !! largest argument of sin_cos
+    real(wp), parameter :: sin_cos_limit = 1.5e6_wp     !! largest argument of sin_cos
     real(wp), parameter :: plain_largest = 1.0e75_wp    !! components whose squares and products are safe
     real(wp), parameter :: plain_smallest = 1.0e-75_wp
 

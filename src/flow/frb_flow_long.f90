@@ -18,10 +18,10 @@ contains
         real(wp), intent(in) :: t           !! h/2
         real(wp), intent(inout) :: m(3)
         real(wp), intent(inout), optional :: q(4)
-        real(wp) :: a, b, g, m1, m2, m3, x1, x2, x3, pt, rt, p, r, pmax, pmin, delta, nu, bg, norm
-        real(wp) :: fraction, turned, whole, span, angle, along, sine, cosine, inverse
+        real(wp) :: a, b, g, m1, m2, m3, gg, p, r, nu_first, nu_mirror, pmax, pmin, delta, nu, bg
+        real(wp) :: norm, over_norm, fraction, turned, whole, span, angle, along, sine, cosine
         real(wp) :: s, y, z, c, d, ec, es, old_y, old_z, n1, n2, n3, n0, cp, dr, v0, v1, v2, v3
-        real(wp) :: d1, d2, d3, w0, w1, w2, w3, q3
+        real(wp) :: d1, d2, d3, size, inverse, w0, w1, w2, w3, q3
         logical :: with_attitude, cn_is_c, first_form
         integer :: i1, i2, i3, squares, triples
 
@@ -32,60 +32,67 @@ contains
         m1 = m(i1)
         m2 = m(i2)
         m3 = body%parity*m(i3)
-        a = body%alpha*t
-        b = body%beta*t
-        g = body%gamma*t
-        x1 = m1*m1
-        x2 = m2*m2
-        x3 = m3*m3
-        pt = b*x1 + a*x2
-        rt = g*x2 + b*x3
-        p = g*pt
-        r = a*rt
-        delta = b*((a*x3) - (g*x1))     ! R - P; the parentheses keep it 0 on the separatrix with FMA
+        call orbit_constants(body%alpha, body%beta, body%gamma, t, m1, m2, m3, a, b, g, gg, p, r, nu_first, &
+                             nu_mirror)
+        delta = orbit_difference(a, b, g, m1, m3)
         cn_is_c = delta <= 0.0_wp
         delta = abs(delta)
         pmax = max(p, r)
         pmin = min(p, r)
-        first_form = g*rt <= a*pt
-        nu = merge(g*rt, a*pt, first_form)
-        norm = sqrt(x1 + x2 + x3)
+        first_form = nu_first <= nu_mirror
+        nu = merge(nu_first, nu_mirror, first_form)
+        norm = sqrt(gg)
+        over_norm = 1/norm
         bg = b*norm
         fraction = 1.0_wp
         whole = 0.0_wp
         turned = 1.0_wp
         if (pmax > period_limit) call reduce_periods(pmax, delta, nu, with_attitude, fraction, turned, whole)
-        squares = 0
-        triples = 0
+        ! What does not wait for the triple comes first: it fills the time the triple takes.
+        sine = 0.0_wp
+        cosine = 1.0_wp
+        if (with_attitude) then
+            angle = norm*(merge(body%a(1), body%a(3), first_form)*t)
+            angle = angle - merge(1.0_wp, -1.0_wp, first_form)*bg*(nu*whole)
+            if (abs(angle) <= sin_cos_limit) then
+                call sin_cos(angle, sine, cosine)
+            else
+                sine = sin(angle)
+                cosine = cos(angle)
+            end if
+        end if
+        ! Down to a part of the time that the series reach, by as many halvings as there are doublings.
         span = fraction*fraction
+        triples = 0
         do while (pmax*span > square_limit)
             span = 0.25_wp*span
             triples = triples + 1
         end do
-        do while (pmax*span > middle_limit)       ! nu <= pmax: the product of its two forms is p r
+        squares = 0
+        do while (pmax*span > middle_limit)       ! nu <= pmax
             span = 0.25_wp*span
             squares = squares + 1
         end do
         call middle_series((p + r)*span, p*r*(span*span), y, s)
         y = y*span
-        s = 1.0_wp
+        s = sqrt(y)
         ec = 1.0_wp
         es = 0.0_wp
         if (with_attitude) then
-            s = sqrt(y)
             call base_angle(bg*(nu*y)*s*middle_third_kind(p*y, r*y, nu*y), ec, es)
         end if
-        c = sqrt(1 - pmax*y)
-        d = sqrt(1 - pmin*y)
         z = 1.0_wp
+        if (squares == 0) then
+            c = sqrt(1 - pmax*y)
+            d = sqrt(1 - pmin*y)
+        end if
         do squares = squares, 1, -1
             old_y = y
             old_z = z
-            s = 2*s*((c*d)*z)               ! for the angle; that of the motion is the root of y
             call double_square(pmax, pmin, y, c, d, z)
+            s = sqrt(y)
             if (with_attitude) call double_angle(nu, bg, old_y, old_z, s, c*d, z, ec, es)
         end do
-        s = sqrt(y)
         do triples = triples, 1, -1
             old_y = s*s
             old_z = z
@@ -107,35 +114,46 @@ contains
         c = turned*c
         cp = merge(c, d, cn_is_c)
         dr = merge(d, c, cn_is_c)
-        call long_momentum(cn_is_c, a, b, g, s, cp, dr, z, m1, m2, m3, n1, n2, n3, n0, d1, d2, d3)
+        call long_momentum(cn_is_c, a, b, g, gg, s, cp, dr, z, m1, m2, m3, n1, n2, n3, n0, d1, d2, d3)
         m(i1) = m1 + d1
         m(i2) = m2 + d2
         m(i3) = body%parity*(m3 + d3)
         if (.not. present(q)) return
-        angle = norm*(merge(body%a(1), body%a(3), first_form)*t)
-        angle = angle - merge(1.0_wp, -1.0_wp, first_form)*bg*(nu*whole)
-        if (abs(angle) <= sin_cos_limit) then
-            call sin_cos(angle, sine, cosine)
-        else
-            sine = sin(angle)
-            cosine = cos(angle)
-        end if
+        ! e z without its norm, which is that of e times that of z and known before e z is.
         c = cosine*ec + merge(sine, -sine, first_form)*es
-        along = (sine*ec - merge(cosine, -cosine, first_form)*es)/norm
+        along = (sine*ec - merge(cosine, -cosine, first_form)*es)*over_norm
         if (first_form) then
             call long_direction(b, g, s, dr, z, n0, n2, n3, v0, v2, v3)
             call join_turns(c, along, m1, m2, m3, v0, v2, v3, w1, w2, w3)
-            d = c*v0 - along*(m2*v2 + m3*v3)
+            w0 = c*v0 - along*(m2*v2 + m3*v3)
         else
             call long_direction(b, a, s, cp, z, n0, n2, n1, v0, v2, v1)
             call join_turns(-c, along, m3, m2, m1, v0, v2, v1, w3, w2, w1)
-            d = c*v0 + along*(m2*v2 + m1*v1)
+            w0 = c*v0 + along*(m2*v2 + m1*v1)
         end if
-        call unit_turn(d, w0, w1, w2, w3)
         q3 = body%parity*q(1 + i3)
-        call turn(w0, w1, w2, w3, q(1), q(1 + i1), q(1 + i2), q3)
+        size = w0*w0 + (w1*w1 + w2*w2 + w3*w3)
+        call turn_far(1/sqrt(size), w0, w1, w2, w3, q(1), q(1 + i1), q(1 + i2), q3)
         q(1 + i3) = body%parity*q3
     end subroutine long_step
+
+    !> q <- q e/|e|, for a turn that is not small: inverse = 1/|e|.
+    pure subroutine turn_far(inverse, e0, e1, e2, e3, q0, q1, q2, q3)
+        real(wp), intent(in) :: inverse, e0, e1, e2, e3
+        real(wp), intent(inout) :: q0, q1, q2, q3
+        real(wp) :: p0, p1, p2, p3
+
+        p0 = q0*e0 - (q1*e1 + q2*e2 + q3*e3)
+        p1 = q1*e0 + (q0*e1 + (q2*e3 - q3*e2))
+        p2 = q2*e0 + (q0*e2 + (q3*e1 - q1*e3))
+        p3 = q3*e0 + (q0*e3 + (q1*e2 - q2*e1))
+        q0 = inverse*p0
+        q1 = inverse*p1
+        q2 = inverse*p2
+        q3 = inverse*p3
+    end subroutine turn_far
+
+    include 'orbit_formulas.inc'
 
     include 'middle_formulas.inc'
 

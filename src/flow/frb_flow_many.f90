@@ -1,6 +1,7 @@
 !> Many free bodies at once: blocks of them through SIMD lanes, blocks through threads.
 module frb_flow_many
-    use frb_flow_block, only: lanes, block_of_bodies, flow_block
+    use frb_flow_block, only: flow_block
+    use frb_flow_lanes, only: lanes, block_of_bodies
     use frb_flow_limits, only: plain_largest, plain_smallest
     use frb_flow_one, only: flow_body
     use frb_inertia, only: rigid_body
@@ -163,23 +164,6 @@ contains
         plain = are_plain(smallest, largest)
     end function all_plain
 
-    !> The bits of a number without its sign: ordered as its size is, with Inf and NaN above all. Comparing
-    !> them raises no exception.
-    elemental function magnitude(x) result(bits)
-        real(wp), intent(in) :: x
-        integer(int64) :: bits
-
-        bits = iand(transfer(x, 0_int64), huge(0_int64))
-    end function magnitude
-
-    !> Whether magnitudes from the smallest to the largest are those of plain numbers.
-    pure function are_plain(smallest, largest) result(plain)
-        integer(int64), intent(in) :: smallest, largest
-        logical :: plain
-
-        plain = largest < transfer(plain_largest, 0_int64) .and. smallest > transfer(plain_smallest, 0_int64)
-    end function are_plain
-
     !> Bodies first to last into the lanes of a block, in sorted axes; lanes that hold no plain state rest.
     subroutine load_block(body, different, count, h, m, bodies, q)
         integer, intent(in) :: different, count     !! bodies that differ: 1 or count
@@ -288,5 +272,7 @@ contains
         if (values(2) == value) place = 2
         if (values(3) == value) place = 3
     end function findloc_of
+
+    include 'plain_numbers.inc'
 
 end module frb_flow_many

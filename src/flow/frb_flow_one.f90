@@ -11,6 +11,7 @@ module frb_flow_one
     use frb_kinds, only: wp
     use frb_status, only: status_ok, status_bad_momentum, status_bad_attitude, status_bad_time
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+    use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
@@ -47,9 +48,10 @@ contains
         real(wp), intent(inout) :: m(3)
         integer, intent(out) :: code
         real(wp), intent(inout), optional :: q(4)
-        real(wp) :: t, a, b, g, m1, m2, m3, x1, x2, x3, pt, rt, p, r, rate, gg, size_m, size_q, largest
+        real(wp) :: t, a, b, g, m1, m2, m3, gg, p, r, nu_first, nu_mirror, rate
         real(wp) :: y, scd, u, w, k, a23, b31, g12, d1, d2, d3
         real(wp) :: nu, v0, v1, v2, v3, angle, twist, cosm1, along, dot, square, change, w0, w1, w2, w3, q3
+        integer(int64) :: smallest, largest
         integer :: i1, i2, i3, reach
         logical :: plain, first_form
 
@@ -60,17 +62,15 @@ contains
         m2 = m(i2)
         m3 = body%parity*m(i3)      ! sorted axes are right-handed: the last one turns round if need be
         t = 0.5_wp*h
-        ! What is finite, not zero and far from overflow goes on; the rest is sorted out apart. No comparison
-        ! sees a NaN, no sum or product overflows on the way.
-        size_m = 0.25_wp*abs(m1) + 0.25_wp*abs(m2) + 0.25_wp*abs(m3)
-        largest = 0.25_wp*size_m + 0.25_wp*abs(t)
-        size_q = 1.0_wp
+        ! What is finite, not zero and far from overflow goes on; the rest is sorted out apart. No sum or
+        ! product overflows on the way.
+        smallest = max(magnitude(m(1)), magnitude(m(2)), magnitude(m(3)))
+        largest = max(smallest, magnitude(t), magnitude(body%a(1)))
         if (present(q)) then
-            size_q = 0.25_wp*abs(q(1)) + 0.25_wp*abs(q(2)) + 0.25_wp*abs(q(3)) + 0.25_wp*abs(q(4))
-            largest = largest + 0.25_wp*size_q
+            largest = max(largest, magnitude(q(1)), magnitude(q(2)), magnitude(q(3)), magnitude(q(4)))
+            smallest = min(smallest, max(magnitude(q(1)), magnitude(q(2)), magnitude(q(3)), magnitude(q(4))))
         end if
-        plain = ieee_is_finite(largest)
-        if (plain) plain = max(largest, body%a(1)) < plain_largest .and. min(size_m, size_q) > plain_smallest
+        plain = are_plain(smallest, largest)
         if (plain) then
             rate = body%a(1)*t
             plain = abs(rate) < plain_largest
@@ -80,17 +80,8 @@ contains
             return
         end if
         code = status_ok
-        a = body%alpha*t
-        b = body%beta*t
-        g = body%gamma*t
-        x1 = m1*m1
-        x2 = m2*m2
-        x3 = m3*m3
-        pt = b*x1 + a*x2
-        rt = g*x2 + b*x3
-        p = g*pt
-        r = a*rt
-        gg = x1 + x2 + x3
+        call orbit_constants(body%alpha, body%beta, body%gamma, t, m1, m2, m3, a, b, g, gg, p, r, nu_first, &
+                             nu_mirror)
         square = rate*rate*gg
         if (max(p, r) <= tiny_limit .and. square <= tiny_turn_limit) then
             reach = tiny_step
@@ -118,7 +109,7 @@ contains
         end select
         u = p*y
         w = r*y
-        k = a*g*x2
+        k = a*g*(m2*m2)
         call short_momentum(u, w, k*(scd*scd), scd, m1, m2, m3, a23, b31, g12, d1, d2, d3)
         m(i1) = m1 + d1
         m(i2) = m2 + d2
@@ -126,13 +117,13 @@ contains
         if (.not. present(q)) return
 
         ! Of the two mirror forms the one with the smaller parameter nu of the third kind.
-        first_form = g*rt <= a*pt
+        first_form = nu_first <= nu_mirror
         if (first_form) then
-            nu = g*rt
+            nu = nu_first
             angle = rate
             twist = -b*nu
         else
-            nu = a*pt
+            nu = nu_mirror
             angle = body%a(3)*t
             twist = b*nu
         end if
@@ -303,6 +294,10 @@ contains
         end if
         m = scale(m, em)
     end subroutine flow_rescaled
+
+    include 'plain_numbers.inc'
+
+    include 'orbit_formulas.inc'
 
     include 'short_formulas.inc'
 
