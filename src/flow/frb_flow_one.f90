@@ -80,20 +80,25 @@ contains
             return
         end if
         code = status_ok
+        square = rate*rate*(m1*m1 + m2*m2 + m3*m3)
+        if (square > middle_turn_limit) then    ! long whatever the orbit: its constants are formed there
+            if (square <= largest_square_angle) then
+                call long_step(body, t, m, q)
+            else
+                call flow_rescaled(body, h, m, code, q)
+            end if
+            return
+        end if
         call orbit_constants(body%alpha, body%beta, body%gamma, t, m1, m2, m3, a, b, g, gg, p, r, nu_first, &
                              nu_mirror)
-        square = rate*rate*gg
         if (max(p, r) <= tiny_limit .and. square <= tiny_turn_limit) then
             reach = tiny_step
         else if (max(p, r) <= short_limit .and. square <= small_turn_limit) then
             reach = short_step
-        else if (max(p, r) <= middle_limit .and. square <= middle_turn_limit) then
+        else if (max(p, r) <= middle_limit) then
             reach = middle_step
-        else if (square <= largest_square_angle) then
-            call long_step(body, t, m, q)
-            return
         else
-            call flow_rescaled(body, h, m, code, q)
+            call long_step(body, t, m, q)
             return
         end if
         a23 = a*(m2*m3)
