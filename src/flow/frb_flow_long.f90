@@ -2,9 +2,8 @@
 !> doublings, many periods by the arithmetic-geometric mean.
 module frb_flow_long
     use frb_flow_limits, only: middle_limit, square_limit, period_limit, smallest_denominator, sin_cos_limit
-    use frb_flow_periods, only: reduce_periods
     use frb_inertia, only: rigid_body
-    use frb_kinds, only: wp
+    use frb_kinds, only: wp, pi
     implicit none
     private
 
@@ -22,7 +21,7 @@ contains
         real(wp) :: norm, over_norm, fraction, turned, whole, span, angle, along, sine, cosine
         real(wp) :: s, y, z, c, d, ec, es, old_y, old_z, n1, n2, n3, n0, cp, dr, v0, v1, v2, v3
         real(wp) :: d1, d2, d3, size, inverse, w0, w1, w2, w3, q3
-        logical :: with_attitude, cn_is_c, first_form
+        logical :: with_attitude, cn_is_c, first_form, many_periods
         integer :: i1, i2, i3, squares, triples
 
         with_attitude = present(q)
@@ -47,7 +46,8 @@ contains
         fraction = 1.0_wp
         whole = 0.0_wp
         turned = 1.0_wp
-        if (pmax > period_limit) call reduce_periods(pmax, delta, nu, with_attitude, fraction, turned, whole)
+        many_periods = pmax > period_limit
+        if (many_periods) call reduce_periods(pmax, delta, nu, with_attitude, fraction, turned, whole)
         ! What does not wait for the triple comes first: it fills the time the triple takes.
         sine = 0.0_wp
         cosine = 1.0_wp
@@ -109,9 +109,11 @@ contains
                 es = es*inverse
             end if
         end do
-        es = sign(1.0_wp, fraction)*es
-        s = sign(1.0_wp, fraction)*(turned*s)
-        c = turned*c
+        if (many_periods) then
+            es = sign(1.0_wp, fraction)*es
+            s = sign(1.0_wp, fraction)*(turned*s)
+            c = turned*c
+        end if
         cp = merge(c, d, cn_is_c)
         dr = merge(d, c, cn_is_c)
         call long_momentum(cn_is_c, a, b, g, gg, s, cp, dr, z, m1, m2, m3, n1, n2, n3, n0, d1, d2, d3)
@@ -152,6 +154,51 @@ contains
         q2 = inverse*p2
         q3 = inverse*p3
     end subroutine turn_far
+
+    !> Takes whole half periods 2 T4 out of the time 1: what is left is `fraction`, |fraction| <= T4;
+    !> an odd number of them turns the sign of s and of the cn-like function, `turned` = -1; the integral of
+    !> the third kind over what is taken out is `whole`. On the separatrix (delta < 1e-200 pmax) there are no
+    !> periods: the motion has settled on the middle axis to all digits after 60 units of 1/lambda, and the
+    !> rest is uniform.
+    pure subroutine reduce_periods(pmax, delta, nu, with_whole, fraction, turned, whole)
+        real(wp), intent(in) :: pmax, delta, nu
+        logical, intent(in) :: with_whole       !! .false.: `whole` is not wanted and comes back 0
+        real(wp), intent(out) :: fraction, turned, whole
+        real(wp), parameter :: most_exact = 2.0_wp**26
+        real(wp), parameter :: separatrix = 1.0e-200_wp
+        real(wp), parameter :: settled = 60.0_wp
+        real(wp), parameter :: round_up = 6755399441055744.0_wp    ! 3 * 2^51: adding it rounds to an integer
+        real(wp) :: period, mean, half, number, high
+
+        turned = 1.0_wp
+        if (delta <= separatrix*pmax) then
+            fraction = min(1.0_wp, settled/sqrt(pmax))
+            whole = (1 - fraction)/(pmax + nu)
+            return
+        end if
+        call quarter_period(pmax, delta, nu, with_whole, period, mean)
+        half = 2*period
+        number = 1/half
+        if (number <= most_exact) then
+            number = (number + round_up) - round_up
+            ! Split half into 27 and 26 bits: number*high is exact, and so is the subtraction that cancels.
+            high = half*134217729.0_wp
+            high = high - (high - half)
+            fraction = (1 - number*high) - number*(half - high)
+        else
+            fraction = mod(1.0_wp, half)
+            number = (1 - fraction)/half
+            if (fraction > period) then
+                fraction = fraction - half
+                number = number + 1
+            end if
+            number = mod(number, 2.0_wp)
+        end if
+        turned = 1 - 2*abs(number - 2*((0.5_wp*number + round_up) - round_up))
+        whole = (1 - fraction)*mean
+    end subroutine reduce_periods
+
+    include 'period_formulas.inc'
 
     include 'orbit_formulas.inc'
 
