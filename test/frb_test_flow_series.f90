@@ -3,6 +3,8 @@
 !> wrong last coefficient; this does not.
 module frb_test_flow_series
     use frb_checks, only: tally
+    use frb_double_flow_formulas, only: sin_cos
+    use frb_flow_limits, only: sin_cos_limit
     use frb_kinds, only: rp => wp
     use frb_quad_flow_formulas, only: wp, tiny_series, tiny_third_kind, short_series, short_third_kind, &
         middle_series, middle_third_kind, small_turn, short_norm, double_square, double_triple
@@ -23,7 +25,7 @@ contains
         real(wp) :: s_terms(0:most), y_terms(0:most), p, r, n, s, y, z, scd, c, d, error(9), sinc, cosm1
         integer :: i, k
 
-        call t%open_suite('flow-series', 9)
+        call t%open_suite('flow-series', 10)
         error = 0.0_wp
         do i = 1, 4
             p = arguments(1, i)
@@ -88,8 +90,27 @@ contains
         call t%at_most('sine-and-cosine-of-a-small-turn-are-their-series', real(error(7), rp), rounding)
         call t%at_most('norm-of-a-short-step-is-its-series', real(error(8), rp), rounding)
         call t%at_most('first-terms-are-those-of-the-series', real(error(9), rp), rounding)
+        call t%at_most('sine-and-cosine-of-any-turn-are-good-to-an-ulp-of-one', turn_error(), epsilon(1.0_rp))
         call t%close_suite()
     end subroutine test_flow_series
+
+    !> Largest error of sin_cos over its range, the neighbours of multiples of pi/4 included.
+    function turn_error() result(error)
+        real(rp) :: error
+        real(wp), parameter :: quarter = atan(1.0_wp)
+        integer, parameter :: many = 20000
+        real(rp) :: x, sine, cosine
+        integer :: i
+
+        error = 0.0_rp
+        do i = -many, many
+            x = sin_cos_limit*(real(i, rp)/many)
+            if (modulo(i, 2) == 0) x = real(nint(x/quarter)*quarter, rp)
+            if (abs(x) > sin_cos_limit) cycle
+            call sin_cos(x, sine, cosine)
+            error = max(error, abs(real(sine - sin(real(x, wp)), rp)), abs(real(cosine - cos(real(x, wp)), rp)))
+        end do
+    end function turn_error
 
     !> The first terms have those coefficients of the whole series that they take: at arguments so small that
     !> what they leave out is beyond quadruple precision.
