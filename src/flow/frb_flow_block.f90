@@ -18,10 +18,11 @@ contains
     !> Advances the bodies of a block by 2 t: m, and q when `with_attitude`. `served` on entry: 1 for bodies
     !> to advance; bodies out of reach come back with 0 and m = 0: their state is the caller's. Bodies with 0
     !> must come with m = 0 and finite numbers.
-    subroutine flow_block(bodies, t, with_attitude)
+    subroutine flow_block(bodies, t, with_attitude, all_served)
         type(block_of_bodies), intent(inout) :: bodies
         real(wp), intent(in) :: t
         logical, intent(in) :: with_attitude
+        logical, intent(out) :: all_served      !! no body was out of reach
         type(workspace) :: work
         real(wp) :: nu_first, nu_mirror
         integer(int64) :: reach, square
@@ -42,8 +43,10 @@ contains
             square = max(square, transfer((bodies%a1(l)*t)**2*work%gg(l), 0_int64))
         end do
         many_long = 0
+        all_served = .true.
         if (reach > transfer(short_limit, 0_int64) .or. square > transfer(small_turn_limit, 0_int64)) then
             call sort_lanes(bodies, t, work, many_long)
+            all_served = all(bodies%served == 1)
         end if
         ! Lanes of all sorts in one block: each loop runs over all lanes, each lane takes its own result.
         call tiny_triple(with_attitude, work)

@@ -55,11 +55,11 @@ contains
             associate (body_1 => body(merge(1, first, bodies == 1):merge(1, last, bodies == 1)))
                 if (present(q)) then
                     call load_block(body_1, one, count, h, m(1, first), block, q(1, first))
-                    call flow_block(block, 0.5_wp*h, .true.)
+                    call flow_block(block, 0.5_wp*h, .true., served)
                     call store_block(body_1, one, count, h, block, m(1, first), refused, q(1, first))
                 else
                     call load_block(body_1, one, count, h, m(1, first), block)
-                    call flow_block(block, 0.5_wp*h, .false.)
+                    call flow_block(block, 0.5_wp*h, .false., served)
                     call store_block(body_1, one, count, h, block, m(1, first), refused)
                 end if
             end associate
@@ -93,6 +93,7 @@ contains
         logical, intent(out) :: served
         integer, intent(inout) :: refused
         real(wp), intent(inout), optional :: q(4, lanes)
+        logical :: all_served
         integer :: l, i1, i2, i3
 
         ! Column of axis j in the block: the inverse of the sorting.
@@ -117,8 +118,8 @@ contains
         if (.not. served) return
         bodies%served = 1
         if (body(1)%parity < 0.0_wp) call reflect(bodies)
-        call flow_block(bodies, 0.5_wp*h, present(q))
-        if (any(bodies%served == 0)) then
+        call flow_block(bodies, 0.5_wp*h, present(q), all_served)
+        if (.not. all_served) then
             call store_block(body, 1, lanes, h, bodies, m, refused, q)
             return
         end if
