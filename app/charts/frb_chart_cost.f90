@@ -177,7 +177,39 @@ contains
             call say(trim(line))
         end do
         close (unit)
+        call table_of_long_steps(options)
     end subroutine chart_speed
+
+    !> Time of one step of any length against that of steps the series reach, in one run.
+    subroutine table_of_long_steps(options)
+        type(settings), intent(in) :: options
+        real(wp), parameter :: all_steps(*) = [0.001_wp, 0.1_wp, 1.0_wp, 10.0_wp, 1.0e2_wp, 1.0e3_wp, &
+            1.0e4_wp, 1.0e5_wp, 1.0e6_wp]
+        type(workload) :: works(2)
+        real(wp), allocatable :: steps(:), ns(:, :, :)
+        character(120) :: line
+        integer :: k, unit
+
+        allocate (steps, source=all_steps(::merge(2, 1, options%quick)))
+        allocate (ns(2, size(steps), merge(5, 9, options%quick)))
+        works(1) = new_workload(find_method('flow'), moments, start, 1.0_wp, 1)
+        works(2) = new_workload(find_method('flow-m'), moments, start, 1.0_wp, 1)
+        call open_table(options, 'long-steps', &
+                        'time of one step of the free flow: median over the repetitions', &
+                        'h*omega, quaternion [ns], momentum only [ns], quaternion/that of 1 rad, '// &
+                        'momentum only/that of 1 rad', unit)
+        call say(' h omega     q ns     m ns  q/1 rad  m/1 rad')
+        call time_over_steps(options, 'long-steps', works, steps, 2.0e-3_wp, merge(2, 10, options%quick), ns)
+        associate (radian => ns(:, minloc(abs(steps - 1.0_wp), dim=1), :))
+            do k = 1, size(steps)
+                write (line, '(es9.1,2f9.1,2f9.2)') steps(k), middle(ns(1, k, :)), middle(ns(2, k, :)), &
+                    middle(ns(1, k, :)/radian(1, :)), middle(ns(2, k, :)/radian(2, :))
+                write (unit, '(a)') trim(line)
+                call say(trim(line))
+            end do
+        end associate
+        close (unit)
+    end subroutine table_of_long_steps
 
     pure function middle(values) result(median)
         real(wp), intent(in) :: values(:)

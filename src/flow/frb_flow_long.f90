@@ -20,7 +20,7 @@ contains
         real(wp) :: a, b, g, m1, m2, m3, gg, p, r, nu_first, nu_mirror, pmax, pmin, delta, nu, bg
         real(wp) :: norm, over_norm, fraction, turned, whole, span, angle, along, sine, cosine
         real(wp) :: s, y, z, c, d, ec, es, old_y, old_z, n1, n2, n3, n0, cp, dr, v0, v1, v2, v3
-        real(wp) :: d1, d2, d3, size, inverse, w0, w1, w2, w3, q3
+        real(wp) :: d1, d2, d3, inverse, w0, w1, w2, w3, q3
         logical :: with_attitude, cn_is_c, first_form, many_periods
         integer :: i1, i2, i3, squares, triples
 
@@ -40,27 +40,11 @@ contains
         pmin = min(p, r)
         first_form = nu_first <= nu_mirror
         nu = merge(nu_first, nu_mirror, first_form)
-        norm = sqrt(gg)
-        over_norm = 1/norm
-        bg = b*norm
         fraction = 1.0_wp
         whole = 0.0_wp
         turned = 1.0_wp
         many_periods = pmax > period_limit
         if (many_periods) call reduce_periods(pmax, delta, nu, with_attitude, fraction, turned, whole)
-        ! What does not wait for the triple comes first: it fills the time the triple takes.
-        sine = 0.0_wp
-        cosine = 1.0_wp
-        if (with_attitude) then
-            angle = norm*(merge(body%a(1), body%a(3), first_form)*t)
-            angle = angle - merge(1.0_wp, -1.0_wp, first_form)*bg*(nu*whole)
-            if (abs(angle) <= sin_cos_limit) then
-                call sin_cos(angle, sine, cosine)
-            else
-                sine = sin(angle)
-                cosine = cos(angle)
-            end if
-        end if
         ! Down to a part of the time that the series reach, by as many halvings as there are doublings.
         span = fraction*fraction
         triples = 0
@@ -76,9 +60,25 @@ contains
         call middle_series((p + r)*span, p*r*(span*span), y, s)
         y = y*span
         s = sqrt(y)
+        ! What does not wait for the doublings comes before them: it fills the time they take.
+        bg = 0.0_wp
+        over_norm = 0.0_wp
         ec = 1.0_wp
         es = 0.0_wp
+        sine = 0.0_wp
+        cosine = 1.0_wp
         if (with_attitude) then
+            norm = sqrt(gg)
+            over_norm = 1/norm
+            bg = b*norm
+            angle = norm*(merge(body%a(1), body%a(3), first_form)*t)
+            angle = angle - merge(1.0_wp, -1.0_wp, first_form)*bg*(nu*whole)
+            if (abs(angle) <= sin_cos_limit) then
+                call sin_cos(angle, sine, cosine)
+            else
+                sine = sin(angle)
+                cosine = cos(angle)
+            end if
             call base_angle(bg*(nu*y)*s*middle_third_kind(p*y, r*y, nu*y), ec, es)
         end if
         z = 1.0_wp
@@ -121,7 +121,7 @@ contains
         m(i2) = m2 + d2
         m(i3) = body%parity*(m3 + d3)
         if (.not. present(q)) return
-        ! e z without its norm, which is that of e times that of z and known before e z is.
+        ! e z up to its norm.
         c = cosine*ec + merge(sine, -sine, first_form)*es
         along = (sine*ec - merge(cosine, -cosine, first_form)*es)*over_norm
         if (first_form) then
@@ -134,17 +134,17 @@ contains
             w0 = c*v0 + along*(m2*v2 + m1*v1)
         end if
         q3 = body%parity*q(1 + i3)
-        size = w0*w0 + (w1*w1 + w2*w2 + w3*w3)
-        call turn_far(1/sqrt(size), w0, w1, w2, w3, q(1), q(1 + i1), q(1 + i2), q3)
+        call turn_far(w0, w1, w2, w3, q(1), q(1 + i1), q(1 + i2), q3)
         q(1 + i3) = body%parity*q3
     end subroutine long_step
 
-    !> q <- q e/|e|, for a turn that is not small: inverse = 1/|e|.
-    pure subroutine turn_far(inverse, e0, e1, e2, e3, q0, q1, q2, q3)
-        real(wp), intent(in) :: inverse, e0, e1, e2, e3
+    !> q <- q e/|e|, for a turn that need not be small. The norm is found while q e is formed.
+    pure subroutine turn_far(e0, e1, e2, e3, q0, q1, q2, q3)
+        real(wp), intent(in) :: e0, e1, e2, e3
         real(wp), intent(inout) :: q0, q1, q2, q3
-        real(wp) :: p0, p1, p2, p3
+        real(wp) :: inverse, p0, p1, p2, p3
 
+        inverse = 1/sqrt(e0*e0 + (e1*e1 + e2*e2 + e3*e3))
         p0 = q0*e0 - (q1*e1 + q2*e2 + q3*e3)
         p1 = q1*e0 + (q0*e1 + (q2*e3 - q3*e2))
         p2 = q2*e0 + (q0*e2 + (q3*e1 - q1*e3))
