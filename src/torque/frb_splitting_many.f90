@@ -1,10 +1,11 @@
 !> The run of n bodies that interact: see frb_splitting.
 module frb_splitting_many
+    use frb_exact_updates, only: turn_state, kick_state
     use frb_free_flow, only: free_flow
     use frb_inertia, only: rigid_body
     use frb_kinds, only: wp
     use frb_schemes, only: splitting_scheme
-    use frb_splitting_plan, only: timetable, new_timetable, check_run, is_attitude, carry, turn_increments
+    use frb_splitting_plan, only: timetable, new_timetable, check_run, is_attitude
     use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_count, status_bad_momentum, &
         status_bad_torque
     use frb_torque, only: group_scene, group_observer, body_drift
@@ -181,7 +182,6 @@ contains
         type(group_state), intent(inout) :: now
         integer, intent(out) :: code
         class(body_drift), intent(in), optional :: drift
-        real(wp) :: m_increment(3), q_increment(4)
         integer :: i
 
         if (.not. table%compensated) then
@@ -191,10 +191,10 @@ contains
             now%turn(1, :) = 1.0_wp
             now%turn(2:4, :) = 0.0_wp
             call advance_all(body, h, now%m_new, now%turn, code, drift)
+            if (code /= status_ok) return
             do i = 1, size(now%m, 2)
-                call turn_increments(now%turn(:, i), now%m(:, i), now%q(:, i), m_increment, q_increment)
-                call carry(now%m(:, i), m_increment, now%m_rest(:, i))
-                call carry(now%q(:, i), q_increment, now%q_rest(:, i))
+                call turn_state(body(min(i, size(body))), now%turn(:, i), now%m(:, i), now%m_rest(:, i), &
+                                now%q(:, i), now%q_rest(:, i))
             end do
         end if
     end subroutine do_drift
@@ -239,7 +239,9 @@ contains
         end do
         code = status_ok
         if (table%compensated) then
-            call carry(now%m, h*tau, now%m_rest)
+            do i = 1, size(tau, 2)
+                call kick_state(h, tau(:, i), now%m(:, i), now%m_rest(:, i))
+            end do
         else
             now%m = now%m + h*tau
         end if

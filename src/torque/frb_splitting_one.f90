@@ -1,10 +1,11 @@
 !> The run of one body: see frb_splitting.
 module frb_splitting_one
+    use frb_exact_updates, only: turn_state, kick_state
     use frb_free_flow, only: free_flow
     use frb_inertia, only: rigid_body
     use frb_kinds, only: wp
     use frb_schemes, only: splitting_scheme
-    use frb_splitting_plan, only: timetable, new_timetable, check_run, is_attitude, carry, turn_increments
+    use frb_splitting_plan, only: timetable, new_timetable, check_run, is_attitude
     use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_momentum, status_bad_torque
     use frb_torque, only: body_scene, body_observer, body_drift
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
@@ -139,7 +140,7 @@ contains
         type(body_state), intent(inout) :: now
         integer, intent(out) :: code
         class(body_drift), intent(in), optional :: drift
-        real(wp) :: m(3), turn(4), m_increment(3), q_increment(4)
+        real(wp) :: m(3), turn(4)
 
         if (.not. table%compensated) then
             if (present(drift)) then
@@ -155,9 +156,7 @@ contains
             else
                 call free_flow(body, h, m, turn, code)
             end if
-            call turn_increments(turn, now%m, now%q, m_increment, q_increment)
-            call carry(now%m, m_increment, now%m_rest)
-            call carry(now%q, q_increment, now%q_rest)
+            if (code == status_ok) call turn_state(body, turn, now%m, now%m_rest, now%q, now%q_rest)
         end if
     end subroutine do_drift
 
@@ -176,7 +175,7 @@ contains
         if (total > 0.25_wp*table%largest_torque) return
         code = status_ok
         if (table%compensated) then
-            call carry(now%m, h*tau, now%m_rest)
+            call kick_state(h, tau, now%m, now%m_rest)
         else
             now%m = now%m + h*tau
         end if

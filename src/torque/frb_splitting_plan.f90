@@ -1,5 +1,5 @@
-!> What a run of a splitting scheme is made of, for one body and for many: the stages multiplied by h, the
-!> checks every call has in common, and compensated updates.
+!> What a run of a splitting scheme is made of, for one body and for many: the stages multiplied by h, and
+!> the checks every call has in common.
 module frb_splitting_plan
     use frb_kinds, only: wp
     use frb_schemes, only: splitting_scheme, most_stages
@@ -8,7 +8,7 @@ module frb_splitting_plan
     implicit none
     private
 
-    public :: timetable, new_timetable, check_run, is_attitude, carry, turn_increments
+    public :: timetable, new_timetable, check_run, is_attitude
 
     !> The stages of a chain of steps, multiplied by h. Within a step come drift(i), the torque at time(i),
     !> kick(i), without the first drift (ABA) or the last kick (BAB): that is the outer stage, shared by two
@@ -96,42 +96,5 @@ contains
         good = all(ieee_is_finite(q))
         if (good) good = any(abs(q) > 0.0_wp)
     end function is_attitude
-
-    !> x + increment with the rounding error of the sum carried over to the next one in `rest` (Kahan,
-    !> Moeller).
-    elemental subroutine carry(x, increment, rest)
-        real(wp), intent(inout) :: x
-        real(wp), intent(in) :: increment
-        real(wp), intent(inout) :: rest     !! what x lacks; 0 at the start
-        real(wp) :: whole, new
-
-        whole = increment + rest
-        new = x + whole
-        rest = whole - (new - x)
-        x = new
-    end subroutine carry
-
-    !> Increments of m and q by a free motion that turns the body by the unit quaternion r, q(h) = q r. Each
-    !> is as accurate as r - 1, that is, far better than the difference of two rounded states when the turn is
-    !> small: m is constant in space, so m(h) = E(r)^T m, and r1 - 1 follows from the norm.
-    pure subroutine turn_increments(r, m, q, m_increment, q_increment)
-        real(wp), intent(in) :: r(4), m(3), q(4)
-        real(wp), intent(out) :: m_increment(3), q_increment(4)
-        real(wp) :: w, c1, c2, c3
-
-        w = r(1) - 1
-        if (r(1) > 0.0_wp) w = -(r(2)*r(2) + r(3)*r(3) + r(4)*r(4))/(1 + r(1))
-        ! With c = r x m the increment of m is 2 (r x c - r1 c).
-        c1 = 2*(r(3)*m(3) - r(4)*m(2))
-        c2 = 2*(r(4)*m(1) - r(2)*m(3))
-        c3 = 2*(r(2)*m(2) - r(3)*m(1))
-        m_increment(1) = (r(3)*c3 - r(4)*c2) - r(1)*c1
-        m_increment(2) = (r(4)*c1 - r(2)*c3) - r(1)*c2
-        m_increment(3) = (r(2)*c2 - r(3)*c1) - r(1)*c3
-        q_increment(1) = q(1)*w - q(2)*r(2) - q(3)*r(3) - q(4)*r(4)
-        q_increment(2) = q(1)*r(2) + q(2)*w + q(3)*r(4) - q(4)*r(3)
-        q_increment(3) = q(1)*r(3) + q(3)*w + q(4)*r(2) - q(2)*r(4)
-        q_increment(4) = q(1)*r(4) + q(4)*w + q(2)*r(3) - q(3)*r(2)
-    end subroutine turn_increments
 
 end module frb_splitting_plan

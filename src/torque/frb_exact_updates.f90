@@ -1,0 +1,179 @@
+!> Updates of a compensated run: a state is x + rest, rest about half a unit of the last digit of x.
+!>
+!> Leading products are exact: numbers are cut in two, x = a + b, where a is a multiple of a unit that all
+!> numbers of its kind share and has 26 bits at most. Products of such parts and sums of these fit in 53 bits,
+!> whether or not the compiler joins them to multiply-adds; all that is rounded is smaller by 2^-24.
+module frb_exact_updates
+    use frb_inertia, only: rigid_body
+    use frb_kinds, only: wp
+    implicit none
+    private
+
+    public :: turn_state, kick_state
+
+    real(wp), parameter :: shift = 2.0_wp**28       ! (x + shift*size) - shift*size: 24 bits of size are left
+    real(wp), parameter :: largest = 1.0e290_wp     ! shift times that does not overflow
+
+contains
+
+    !> m + h tau, with h tau to the last digit of m_rest.
+    pure subroutine kick_state(h, tau, m, m_rest)
+        real(wp), intent(in) :: h, tau(3)
+        real(wp), intent(inout) :: m(3), m_rest(3)
+        real(wp) :: cut, h_a, h_b
+        integer :: i
+
+        cut = shift*min(abs(h), largest)
+        h_a = (h + cut) - cut
+        h_b = h - h_a
+        cut = shift*min(max(abs(tau(1)), abs(tau(2)), abs(tau(3))), largest)
+        do i = 1, 3
+            call kick_one(h, h_a, h_b, tau(i), (tau(i) + cut) - cut, m(i), m_rest(i))
+        end do
+    end subroutine kick_state
+
+    !> One component. The new m waits neither for the parts of tau nor for m_rest, which the drift adds to it.
+    pure subroutine kick_one(h, h_a, h_b, tau, tau_a, m, m_rest)
+        real(wp), intent(in) :: h, h_a, h_b, tau, tau_a
+        real(wp), intent(inout) :: m, m_rest
+        real(wp) :: new, change
+
+        new = m + h*tau
+        change = new - m
+        m_rest = (m - (new - change)) + ((h_a*tau_a - change) + ((h_a*(tau - tau_a) + h_b*tau) + m_rest))
+        m = new
+    end subroutine kick_one
+
+    !> The state after a free motion that turns the body by the unit quaternion r: q(h) = q r, and m(h) =
+    !> E(r)^T m, as m is constant in space. The increments are as accurate as r - 1, whose scalar part follows
+    !> from the norm; |m| and the energy are kept far better: see keep_norm_and_energy.
+    pure subroutine turn_state(body, r, m, m_rest, q, q_rest)
+        type(rigid_body), intent(in) :: body
+        real(wp), intent(in) :: r(4)
+        real(wp), intent(inout) :: m(3), m_rest(3), q(4), q_rest(4)
+        real(wp) :: w, rr, c1, c2, c3, q0, q1, q2, q3, m1, m2, m3, cut, change, high(3), low(3)
+
+        rr = r(2)*r(2) + r(3)*r(3) + r(4)*r(4)
+        w = r(1) - 1
+        if (r(1) > 0.0_wp) w = -rr/(1 + r(1))
+        q0 = q(1)
+        q1 = q(2)
+        q2 = q(3)
+        q3 = q(4)
+        call add(q(1), q_rest(1), q_rest(1) + (q0*w - q1*r(2) - q2*r(3) - q3*r(4)))
+        call add(q(2), q_rest(2), q_rest(2) + (q0*r(2) + q1*w + q2*r(4) - q3*r(3)))
+        call add(q(3), q_rest(3), q_rest(3) + (q0*r(3) + q2*w + q3*r(2) - q1*r(4)))
+        call add(q(4), q_rest(4), q_rest(4) + (q0*r(4) + q3*w + q1*r(3) - q2*r(2)))
+        m1 = m(1)
+        m2 = m(2)
+        m3 = m(3)
+        ! With c = 2 r x m the increment of m is r x c - r1 c.
+        c1 = 2*(r(3)*m3 - r(4)*m2)
+        c2 = 2*(r(4)*m1 - r(2)*m3)
+        c3 = 2*(r(2)*m2 - r(3)*m1)
+        cut = shift*min(abs(m1) + abs(m2) + abs(m3), largest)
+        change = m_rest(1) + ((r(3)*c3 - r(4)*c2) - r(1)*c1)
+        call square_change(m1, m_rest(1), change, cut, high(1), low(1))
+        call add(m(1), m_rest(1), change)
+        change = m_rest(2) + ((r(4)*c1 - r(2)*c3) - r(1)*c2)
+        call square_change(m2, m_rest(2), change, cut, high(2), low(2))
+        call add(m(2), m_rest(2), change)
+        change = m_rest(3) + ((r(2)*c2 - r(3)*c1) - r(1)*c3)
+        call square_change(m3, m_rest(3), change, cut, high(3), low(3))
+        call add(m(3), m_rest(3), change)
+        ! Far from overflow and underflow only.
+        if (cut > 1.0e-60_wp .and. cut < 1.0e60_wp) then
+            call keep_norm_and_energy(body, rr, high, low, m, m_rest, q, q_rest)
+        end if
+    end subroutine turn_state
+
+    !> (m + change)^2 - (m + rest)^2 = high + low, high exact.
+    pure subroutine square_change(m, rest, change, cut, high, low)
+        real(wp), intent(in) :: m, rest, change, cut
+        real(wp), intent(out) :: high, low
+        real(wp) :: a, b, d, e, s, t
+
+        a = (m + cut) - cut
+        b = (m - a) + rest
+        d = (change + cut) - cut
+        e = (change - d) - rest
+        s = 2*a + d
+        t = 2*b + e
+        high = d*s
+        low = d*t + e*(s + t)
+    end subroutine square_change
+
+    !> Takes back what rounding did to |m|, by a change along m, and to the kinetic energy, by a turn v of m
+    !> and q, of a few units of the last digit of the drift's turn; rr is the square of the vector of that,
+    !> high + low are the changes of the squares of m. Where a drift does not keep the energy to rounding it
+    !> is left as it is, and so it is for a body given by a tensor.
+    !>
+    !> The motion magnifies these two errors in proportion to the time, and under a weak torque no others.
+    !> In sorted axes 2 T is beta m1^2 + alpha m2^2 but for what |m| gives.
+    pure subroutine keep_norm_and_energy(body, rr, high, low, m, m_rest, q, q_rest)
+        type(rigid_body), intent(in) :: body
+        real(wp), intent(in) :: rr, high(3), low(3), m(3), q(4)
+        real(wp), intent(inout) :: m_rest(3), q_rest(4)
+        real(wp), parameter :: limit = (32*epsilon(1.0_wp))**2
+        real(wp) :: alpha, beta, c, part1, part2, stretch, half, defect
+        real(wp) :: k1, k2, k3, kk, m1, m2, m3, v1, v2, v3, v(3)
+        integer :: i1, i2, i3
+
+        half = -0.5_wp/(m(1)*m(1) + m(2)*m(2) + m(3)*m(3))
+        stretch = half*((high(1) + high(2) + high(3)) + (low(1) + low(2) + low(3)))
+        m_rest(1) = m_rest(1) + stretch*m(1)
+        m_rest(2) = m_rest(2) + stretch*m(2)
+        m_rest(3) = m_rest(3) + stretch*m(3)
+        if (body%turned .or. body%beta < 1.0e-20_wp .or. body%beta > 1.0e20_wp) return
+
+        i1 = body%order(1)
+        i2 = body%order(2)
+        i3 = body%order(3)
+        m1 = m(i1)
+        m2 = m(i2)
+        m3 = body%parity*m(i3)
+        k1 = body%alpha*(m2*m3)
+        k2 = -body%beta*(m3*m1)
+        k3 = body%gamma*(m1*m2)
+        kk = k1*k1 + k2*k2 + k3*k3
+        c = shift*body%beta
+        beta = (body%beta + c) - c
+        alpha = (body%alpha + c) - c
+        c = shift*max(abs(high(i1)), abs(high(i2)))
+        part1 = (high(i1) + c) - c
+        part2 = (high(i2) + c) - c
+        defect = (beta*part1 + alpha*part2) &
+                 + (body%beta*((high(i1) - part1) + low(i1)) + body%alpha*((high(i2) - part2) + low(i2))) &
+                 + (((body%beta - beta)*part1 + (body%alpha - alpha)*part2) &
+                    + (2*stretch)*(body%beta*(m1*m1) + body%alpha*(m2*m2)))
+        if (.not. defect*defect < limit*rr*kk) return
+        defect = (-0.25_wp/kk)*defect
+        v(i1) = defect*k1
+        v(i2) = defect*k2
+        v(i3) = body%parity*(defect*k3)
+        v1 = v(1)
+        v2 = v(2)
+        v3 = v(3)
+        m_rest(1) = m_rest(1) - 2*(v2*m(3) - v3*m(2))
+        m_rest(2) = m_rest(2) - 2*(v3*m(1) - v1*m(3))
+        m_rest(3) = m_rest(3) - 2*(v1*m(2) - v2*m(1))
+        q_rest(1) = q_rest(1) - (q(2)*v1 + q(3)*v2 + q(4)*v3)
+        q_rest(2) = q_rest(2) + (q(1)*v1 + q(3)*v3 - q(4)*v2)
+        q_rest(3) = q_rest(3) + (q(1)*v2 + q(4)*v1 - q(2)*v3)
+        q_rest(4) = q_rest(4) + (q(1)*v3 + q(2)*v2 - q(3)*v1)
+    end subroutine keep_norm_and_energy
+
+    !> x + change, and in rest what x then lacks (Knuth).
+    pure subroutine add(x, rest, change)
+        real(wp), intent(inout) :: x
+        real(wp), intent(out) :: rest
+        real(wp), intent(in) :: change
+        real(wp) :: total, part
+
+        total = x + change
+        part = total - x
+        rest = (x - (total - part)) + (change - part)
+        x = total
+    end subroutine add
+
+end module frb_exact_updates
