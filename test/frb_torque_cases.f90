@@ -3,7 +3,7 @@ module frb_torque_cases
     use frb_free_flow, only: free_flow
     use frb_inertia, only: rigid_body
     use frb_kinds, only: wp
-    use frb_rotations, only: cross, quat_conjugate, quat_rotate
+    use frb_rotations, only: cross, quat_conjugate, quat_product, quat_rotate
     use frb_scenes, only: heavy_top
     use frb_status, only: status_bad_option
     use frb_torque, only: body_scene, group_scene, body_observer, group_observer, body_drift
@@ -12,7 +12,7 @@ module frb_torque_cases
     private
 
     public :: top_case, known_top, distance, recorder, group_recorder, pulsed_torque, spoilt_torque, &
-        plain_drift, failing_drift, dipoles, many_tops
+        plain_drift, failing_drift, tilting_drift, dipoles, many_tops
 
     !> A heavy top with its start and its end after the time t, to 25 digits (data/reference/make_tops.py).
     type :: top_case
@@ -62,6 +62,12 @@ module frb_torque_cases
     contains
         procedure :: advance => advance_plainly
     end type plain_drift
+
+    !> The free flow with a turn of 2e-6 h about axis 1 after it, which keeps |m| and not the energy.
+    type, extends(body_drift) :: tilting_drift
+    contains
+        procedure :: advance => advance_tilting
+    end type tilting_drift
 
     !> A drift that gives up.
     type, extends(body_drift) :: failing_drift
@@ -188,6 +194,22 @@ contains
         end associate
         call free_flow(body, h, m, q, stat)
     end subroutine advance_plainly
+
+    subroutine advance_tilting(self, body, h, m, q, stat)
+        class(tilting_drift), intent(in) :: self
+        type(rigid_body), intent(in) :: body
+        real(wp), intent(in) :: h
+        real(wp), intent(inout) :: m(3), q(4)
+        integer, intent(out) :: stat
+        real(wp) :: tilt(4)
+
+        associate (unused_self => self)
+        end associate
+        call free_flow(body, h, m, q, stat)
+        tilt = [1.0_wp, 1.0e-6_wp*h, 0.0_wp, 0.0_wp]    ! of norm 1 to rounding
+        m = quat_rotate(quat_conjugate(tilt), m)
+        q = quat_product(q, tilt)
+    end subroutine advance_tilting
 
     subroutine give_up(self, body, h, m, q, stat)
         class(failing_drift), intent(in) :: self
