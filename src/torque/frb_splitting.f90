@@ -23,22 +23,26 @@ module frb_splitting
     !> norm zero (`status_bad_attitude`); a torque that is not finite, or so large that m overflows, at any
     !> time of the run (`status_bad_torque`).
     !>
-    !> `compensated` carries the rounding error of every update of m and q over to the next one. It takes
-    !> about 40 % more time and pays in long runs of small steps: there energy, momentum and norm stay within
-    !> a few units of the last digit, where a plain run wanders by the square root of the number of steps.
+    !> `compensated` carries the rounding error of every update of m and q over to the next one, and keeps |m|
+    !> and the energy in every drift. It takes about 80 % more time and pays in long runs: there energy,
+    !> momentum and norm stay within a few units of the last digit, where a plain run wanders by the square
+    !> root of the number of steps.
     !>
     !> Accuracy: energy of the paper's heavy top within 1e-13 over 1e5 steps of 0.5; checked by `splitting:
     !> energy-of-the-papers-top-stays-within-1e-13`; compensated, of the Hairer-Vilmart top within 32 epsilon
     !> over 20 000 steps of 0.01; checked by `splitting: compensated-energy-does-not-wander`.
     !>
     !> Reversal: 10 000 steps and as many of -h return the start to 1e-12 in a compensated run up to h = 0.01
-    !> on the Hairer-Vilmart tops (1e-13 at most) and up to h = 0.1 on the paper's (2e-13), in a plain run up
-    !> to a tenth of that; checked by `splitting: ...-there-and-back-return-the-start`. A compensated run
-    !> rounds only the turn of each drift, by about its angle times epsilon; what is left is that rounding, as
-    !> the motion itself magnifies it: a small change of the start grows in proportion to the time, 0.25 t on
-    !> the paper's top, 0.8 t and 2 t on the other two. With h = 0.5, T = 5000 on the paper's top the distance
-    !> is 1e-13 to 3e-12, plain 2e-12 to 3e-11; with h = 0.1, T = 1000 on the others 1e-13 to 1e-11, plain
-    !> 2e-12 to 1e-10. The chart program's `torque` makes the table.
+    !> on the Hairer-Vilmart tops (1e-13 at most) and on the paper's up to h = 0.5, T = 5000 (2e-13), in
+    !> a plain run up to h = 0.001 and 0.01; checked by `splitting: ...-there-and-back-return-the-start` and
+    !> `splitting: ...-papers-long-run-there-and-back-returns-the-start`. A small change of the start grows in
+    !> proportion to the time, 0.2 t on the paper's top, 0.8 t and 2 t on the other two, and rounding errors
+    !> grow with it. Without torque it is errors of |m| and of the energy that grow; these are taken back
+    !> after each drift, the energy only if the drift keeps it to rounding and the body is given by its
+    !> moments. Under a torque as strong as on the Hairer-Vilmart tops the last digits of the turn of each
+    !> drift and of the torque count as well: with h = 0.1, T = 1000 the distance is 1e-13 to 2.5e-12 on the
+    !> asymmetric one and 2e-13 to 4e-12 on the flat one, plain 2e-12 to 1e-10. The chart program's `torque`
+    !> makes the table.
     interface integrate
         procedure integrate_body
         procedure integrate_alike
