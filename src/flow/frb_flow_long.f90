@@ -39,7 +39,7 @@ contains
         pmax = max(p, r)
         pmin = min(p, r)
         first_form = nu_first <= nu_mirror
-        nu = merge(nu_first, nu_mirror, first_form)
+        nu = min(nu_first, nu_mirror)
         fraction = 1.0_wp
         whole = 0.0_wp
         turned = 1.0_wp

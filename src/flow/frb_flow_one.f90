@@ -148,12 +148,12 @@ contains
             call short_direction(b, g, w, k*y, y, scd, m2, m3, b31, g12, v0, v2, v3)
             call join_turns(1 + cosm1, along, m1, m2, m3, 1 + v0, v2, v3, w1, w2, w3)
             dot = along*(m2*v2 + m3*v3)
-            square = v0*(2 + v0) + (v2*v2 + v3*v3)
+            square = (v0*(2 + v0) + v2*v2) + v3*v3
         else
             call short_direction(b, a, u, k*y, y, scd, m2, m1, b31, a23, v0, v2, v1)
             call join_turns(-(1 + cosm1), along, m3, m2, m1, 1 + v0, v2, v1, w3, w2, w1)
             dot = -along*(m2*v2 + m1*v1)
-            square = v0*(2 + v0) + (v2*v2 + v1*v1)
+            square = (v0*(2 + v0) + v2*v2) + v1*v1
         end if
         select case (reach)
         case (tiny_step)
@@ -175,7 +175,7 @@ contains
         real(wp), intent(out) :: sinc, cosm1
 
         sinc = (1 - xx*(1/6.0_wp)) + (xx*xx)*(1/120.0_wp - xx*(1/5040.0_wp))
-        cosm1 = -xx*((0.5_wp - xx*(1/24.0_wp)) + (xx*xx)*(1/720.0_wp - xx*(1/40320.0_wp)))
+        cosm1 = (xx*xx)*((1/24.0_wp - xx*(1/720.0_wp)) + (xx*xx)*(1/40320.0_wp)) - 0.5_wp*xx
     end subroutine tiny_turn
 
     !> sin(x)/x and cos(x) - 1 from xx = x^2 <= middle_turn_limit, to rounding.
@@ -190,9 +190,9 @@ contains
                 + x8*((1/362880.0_wp - xx*(1/39916800.0_wp)) &
                       + x4*(1/6227020800.0_wp - xx*(1/1307674368000.0_wp)))) &
                + (x8*x8)*(1/355687428096000.0_wp)
-        cosm1 = -xx*(((0.5_wp - xx*(1/24.0_wp)) + x4*(1/720.0_wp - xx*(1/40320.0_wp))) &
-                     + x8*((1/3628800.0_wp - xx*(1/479001600.0_wp)) &
-                           + x4*(1/87178291200.0_wp - xx*(1/20922789888000.0_wp))))
+        cosm1 = x4*(((1/24.0_wp - xx*(1/720.0_wp)) + x4*(1/40320.0_wp - xx*(1/3628800.0_wp))) &
+                    + x8*((1/479001600.0_wp - xx*(1/87178291200.0_wp)) + x4*(1/20922789888000.0_wp))) &
+                - 0.5_wp*xx
     end subroutine middle_turn
 
     !> As short_norm, for steps of middle length.
@@ -210,7 +210,8 @@ contains
         real(wp), intent(in) :: square
         real(wp) :: change
 
-        change = -square*((0.5_wp - square*(3/8.0_wp)) + (square*square)*(5/16.0_wp - square*(35/128.0_wp)))
+        change = (square*square)*((3/8.0_wp - square*(5/16.0_wp)) + (square*square)*(35/128.0_wp)) &
+                 - 0.5_wp*square
     end function tiny_norm
 
     !> flow_one for a body whose own axes are not principal: the momentum is taken to principal axes, and only
