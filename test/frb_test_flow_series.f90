@@ -108,7 +108,8 @@ contains
             if (modulo(i, 2) == 0) x = real(nint(x/quarter)*quarter, rp)
             if (abs(x) > sin_cos_limit) cycle
             call sin_cos(x, sine, cosine)
-            error = max(error, abs(real(sine - sin(real(x, wp)), rp)), abs(real(cosine - cos(real(x, wp)), rp)))
+            error = max(error, abs(real(sine - sin(real(x, wp)), rp)), &
+                        abs(real(cosine - cos(real(x, wp)), rp)))
         end do
     end function turn_error
 
