@@ -11,7 +11,7 @@
 !> match. Refused state is left as it is. Zero momentum, h = 0 and n = 0 are the identity.
 !>
 !> Accuracy: m and attitude within 2 units (medians within 0.5) of the inherent sensitivity, on the 325 cases
-!> of data/reference and as many of another seed; largest seen 1.9. Held by the suite `free-flow`.
+!> of data/reference and as many of another seed; largest seen 1.6. Held by the suite `free-flow`.
 !> Phases have no digits left when the angle turned in one step passes 2^53; the state is then on the right
 !> orbit, at an arbitrary phase.
 module frb_free_flow

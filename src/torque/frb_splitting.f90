@@ -24,7 +24,7 @@ module frb_splitting
     !> time of the run (`status_bad_torque`).
     !>
     !> `compensated` carries the rounding error of every update of m and q over to the next one, and keeps |m|
-    !> and the energy in every drift. It takes about 80 % more time and pays in long runs: there energy,
+    !> and the energy in every drift. It takes about 90 % more time and pays in long runs: there energy,
     !> momentum and norm stay within a few units of the last digit, where a plain run wanders by the square
     !> root of the number of steps.
     !>
