@@ -33,7 +33,7 @@ module frb_test_flow_runs
     !> Measured: 0.06 and 0.9.
     real(wp), parameter :: bias = 0.25_wp
     real(wp), parameter :: walk_length = 4.0_wp
-    !> Drift of one motion in a long step, in units of 2^-53. Measured: 0.04 (m), 0.11 (q), 0.21 (energy).
+    !> Drift of one motion in a long step, in units of 2^-53. Measured: 0.06 (m), 0.08 (q), 0.25 (energy).
     real(wp), parameter :: long_drift = 0.6_wp
 
 contains
