@@ -2,6 +2,7 @@
 module frb_test_splitting
     use frb_checks, only: tally
     use frb_free_flow, only: free_flow
+    use frb_free_motion, only: free_motion
     use frb_inertia, only: rigid_body
     use frb_invariants, only: invariant_monitor, kinetic_energy, norm_defect, spatial_momentum, total_energy
     use frb_kinds, only: wp
@@ -26,7 +27,7 @@ contains
     subroutine test_splitting(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('splitting', 176)
+        call t%open_suite('splitting', 181)
         call test_values(t)
         call test_top_torque(t)
         call test_orders(t)
@@ -318,7 +319,10 @@ contains
         type(recorder) :: seen
         type(plain_drift) :: drift
         type(tilting_drift) :: tilting
-        real(wp) :: m(3), q(4), m_seen(3), q_seen(4)
+        type(heavy_top) :: free_top
+        type(rigid_body) :: body
+        type(free_motion) :: motion
+        real(wp) :: m(3), q(4), m_seen(3), q_seen(4), start(3)
         integer :: k
 
         item = known_top(3)
@@ -348,6 +352,37 @@ contains
                            distance(m_seen, q_seen, m, q), 0.0_wp)
             call t%at_most('observer-sees-the-end-of-a-compensated-run-as-it-is-returned', &
                            distance(seen%m(:, 5), seen%q(:, 5), m, q), 0.0_wp)
+        end do
+
+        ! Drifts that move m far in the body: half a period each; and momenta whose squares overflow.
+        free_top = heavy_top(force=[0.0_wp, 0.0_wp, 0.0_wp])
+        body = rigid_body([0.6_wp, 0.8_wp, 1.0_wp])
+        start = [1.0_wp, 0.05_wp, 1.05_wp]
+        motion = free_motion(body, start, item%q0)
+        m = start
+        q = item%q0
+        call integrate(body, splitting_scheme('strang'), free_top, 0.5_wp*motion%period(), 200, m, q, &
+                       compensated=.true.)
+        call t%close_to('compensated-drifts-of-half-a-period-keep-the-norm-of-m', norm2(m), norm2(start), &
+                        8*eps)
+        call t%close_to('compensated-drifts-of-half-a-period-keep-the-energy', sum(m*m/body%moments), &
+                        sum(start*start/body%moments), 16*eps)
+        m_seen = start
+        q_seen = item%q0
+        call integrate(body, splitting_scheme('strang'), free_top, 0.5_wp*motion%period(), 200, m_seen, &
+                       q_seen)
+        call t%at_most('compensated-drifts-of-half-a-period-go-the-same-way', &
+                       distance(m, q, m_seen, q_seen), 1.0e-10_wp)
+        m = start
+        q = item%q0
+        call integrate(body, splitting_scheme('strang'), free_top, 0.3_wp, 20, m, q, compensated=.true.)
+        do k = -200, 200, 400
+            m_seen = start*10.0_wp**k
+            q_seen = item%q0
+            call integrate(body, splitting_scheme('strang'), free_top, 0.3_wp/10.0_wp**k, 20, m_seen, &
+                           q_seen, compensated=.true.)
+            call t%at_most('compensated-runs-take-momenta-of-any-size', &
+                           distance(m, q, m_seen/10.0_wp**k, q_seen), 1.0e-13_wp)
         end do
 
         ! Its energy changes by 1e-7 a step: that is no rounding.

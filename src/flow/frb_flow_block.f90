@@ -22,7 +22,7 @@ contains
         type(block_of_bodies), intent(inout) :: bodies
         real(wp), intent(in) :: t
         logical, intent(in) :: with_attitude
-        logical, intent(out) :: all_served      !! no body was out of reach
+        logical, intent(out) :: all_served      !! every lane of a whole block was advanced
         type(workspace) :: work
         real(wp) :: nu_first, nu_mirror
         integer(int64) :: reach, square

@@ -2,7 +2,8 @@
 !> short and middle ones by series, here; longer ones by doubling, in frb_flow_long.
 !>
 !> Closed form: m by the addition theorem of the elliptic functions written in m itself; attitude q e z with e
-!> a rotation about m by an angle with one integral of the third kind, z algebraic. Updates are increments.
+!> a rotation about m by an angle with one integral of the third kind, z algebraic. Updates here are
+!> increments.
 module frb_flow_one
     use frb_flow_limits, only: short_limit, tiny_limit, tiny_turn_limit, small_turn_limit, middle_limit, &
         middle_turn_limit, plain_largest, plain_smallest

@@ -13,6 +13,8 @@ module frb_exact_updates
 
     real(wp), parameter :: shift = 2.0_wp**28       ! (x + shift*size) - shift*size: 24 bits of size are left
     real(wp), parameter :: largest = 1.0e290_wp     ! shift times that does not overflow
+    ! Momenta whose squares and products are far from overflow and underflow: |m| and the energy are kept.
+    real(wp), parameter :: smallest_kept = 1.0e-60_wp, largest_kept = 1.0e60_wp
 
 contains
 
@@ -51,7 +53,8 @@ contains
         type(rigid_body), intent(in) :: body
         real(wp), intent(in) :: r(4)
         real(wp), intent(inout) :: m(3), m_rest(3), q(4), q_rest(4)
-        real(wp) :: w, rr, c1, c2, c3, q0, q1, q2, q3, m1, m2, m3, cut, change, high(3), low(3)
+        real(wp) :: w, rr, c1, c2, c3, q0, q1, q2, q3, m1, m2, m3, cut
+        real(wp) :: change(3), high(3), low(3)
 
         rr = r(2)*r(2) + r(3)*r(3) + r(4)*r(4)
         w = r(1) - 1
@@ -71,20 +74,29 @@ contains
         c1 = 2*(r(3)*m3 - r(4)*m2)
         c2 = 2*(r(4)*m1 - r(2)*m3)
         c3 = 2*(r(2)*m2 - r(3)*m1)
-        cut = shift*min(abs(m1) + abs(m2) + abs(m3), largest)
-        change = m_rest(1) + ((r(3)*c3 - r(4)*c2) - r(1)*c1)
-        call square_change(m1, m_rest(1), change, cut, high(1), low(1))
-        call add(m(1), m_rest(1), change)
-        change = m_rest(2) + ((r(4)*c1 - r(2)*c3) - r(1)*c2)
-        call square_change(m2, m_rest(2), change, cut, high(2), low(2))
-        call add(m(2), m_rest(2), change)
-        change = m_rest(3) + ((r(2)*c2 - r(3)*c1) - r(1)*c3)
-        call square_change(m3, m_rest(3), change, cut, high(3), low(3))
-        call add(m(3), m_rest(3), change)
-        ! Far from overflow and underflow only.
-        if (cut > 1.0e-60_wp .and. cut < 1.0e60_wp) then
-            call keep_norm_and_energy(body, rr, high, low, m, m_rest, q, q_rest)
+        change(1) = m_rest(1) + ((r(3)*c3 - r(4)*c2) - r(1)*c1)
+        change(2) = m_rest(2) + ((r(4)*c1 - r(2)*c3) - r(1)*c2)
+        change(3) = m_rest(3) + ((r(2)*c2 - r(3)*c1) - r(1)*c3)
+        cut = max(abs(m1), abs(m2), abs(m3))
+        if (.not. (cut > smallest_kept .and. cut < largest_kept)) then
+            call add(m(1), m_rest(1), change(1))
+            call add(m(2), m_rest(2), change(2))
+            call add(m(3), m_rest(3), change(3))
+            return
         end if
+        cut = shift*(abs(m1) + abs(m2) + abs(m3))
+        call square_change(m1, m_rest(1), change(1), cut, high(1), low(1))
+        call square_change(m2, m_rest(2), change(2), cut, high(2), low(2))
+        call square_change(m3, m_rest(3), change(3), cut, high(3), low(3))
+        call add(m(1), m_rest(1), change(1))
+        call add(m(2), m_rest(2), change(2))
+        call add(m(3), m_rest(3), change(3))
+        call keep_norm_and_energy(body, rr, high, low, m, m_rest, q, q_rest)
+        ! Back to half a unit: the next drift turns m and not the rest, and a larger one would grow by it.
+        change = m_rest
+        call add(m(1), m_rest(1), change(1))
+        call add(m(2), m_rest(2), change(2))
+        call add(m(3), m_rest(3), change(3))
     end subroutine turn_state
 
     !> (m + change)^2 - (m + rest)^2 = high + low, high exact.
