@@ -41,7 +41,7 @@ contains
     subroutine test_flow_runs(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('flow-runs', 23)
+        call t%open_suite('flow-runs', 26)
         call check_growth(t)
         call check_million(t)
         call check_bias(t)
@@ -119,7 +119,8 @@ contains
         slope = sum((x - sum(x)/size(x))*y)/sum((x - sum(x)/size(x))**2)
     end function fitted_slope
 
-    !> 10^6 steps of 0.01: norms, energy, momentum in space; quaternion, matrix, momentum alone, batch.
+    !> 10^6 steps of 0.01: norms, energy, momentum in space; quaternion, matrix, momentum alone, batch. The
+    !> first of these after 10^7 steps too.
     subroutine check_million(t)
         type(tally), intent(inout) :: t
         real(wp), parameter :: moments(3) = [0.4_wp, 0.7_wp, 1.0_wp], m0(3) = [0.5_wp, -0.7_wp, 0.6_wp]
@@ -142,6 +143,12 @@ contains
         call t%at_most('momentum-in-space-after-a-million-steps', &
                        norm3(quat_rotate(settled(q), m) - m0)/norm3(m0), 10*kept)
         call t%at_most('momentum-alone-is-the-same-after-a-million-steps', maxval(abs(m_alone - m)), 0.0_wp)
+        do step = steps + 1, 10*steps
+            call free_flow(body, 0.01_wp, m, q)
+        end do
+        call t%at_most('norm-of-m-after-ten-million-steps', abs(norm3(settled(m))/norm3(m0) - 1), kept)
+        call t%at_most('norm-of-q-after-ten-million-steps', abs(norm2(settled(q)) - 1), kept)
+        call t%at_most('energy-after-ten-million-steps', energy_change(moments, m0, settled(m)), kept)
         m_matrix = m0
         a = no_rotation
         many_m(:, 1) = m0

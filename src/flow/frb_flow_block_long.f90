@@ -22,7 +22,7 @@ contains
         real(wp) :: norm(lanes), bg(lanes), ec(lanes), es(lanes)
         real(wp) :: n1(lanes), n2(lanes), n3(lanes), n0(lanes), cp(lanes), dr(lanes)
         real(wp) :: n, sine, cosine, along, v0, v2, v3, e0, form, first, last
-        real(wp) :: new_y, new_s, new_c, new_d, new_z, new_ec, new_es, w0, w1, w2, w3
+        real(wp) :: new_y, new_s, new_c, new_d, new_z, w0, w1, w2, w3
         integer :: most_triples, most_squares, i, l
 
         do l = 1, lanes
@@ -77,14 +77,7 @@ contains
                 s(l) = sqrt(y(l))
             end do
             if (with_attitude) then
-                do l = 1, lanes
-                    new_ec = ec(l)
-                    new_es = es(l)
-                    call double_angle(work%long_nu(l), bg(l), old_y(l), old_z(l), s(l), c(l)*d(l), z(l), &
-                                      new_ec, new_es)
-                    ec(l) = merge(new_ec, ec(l), squares(l) >= n)
-                    es(l) = merge(new_es, es(l), squares(l) >= n)
-                end do
+                call double_angles(n, squares, work%long_nu, bg, old_y, old_z, s, c, d, z, ec, es)
             end if
         end do
         do i = 1, most_triples
@@ -103,14 +96,7 @@ contains
                 z(l) = merge(new_z, z(l), triples(l) >= n)
             end do
             if (with_attitude) then
-                do l = 1, lanes
-                    new_ec = ec(l)
-                    new_es = es(l)
-                    call double_angle(work%long_nu(l), bg(l), old_y(l), old_z(l), s(l), c(l)*d(l), z(l), &
-                                      new_ec, new_es)
-                    ec(l) = merge(new_ec, ec(l), triples(l) >= n)
-                    es(l) = merge(new_es, es(l), triples(l) >= n)
-                end do
+                call double_angles(n, triples, work%long_nu, bg, old_y, old_z, s, c, d, z, ec, es)
             end if
             if (any(z < smallest_denominator)) call form_anew(s, c, d, z, ec, es)
         end do
@@ -144,6 +130,24 @@ contains
             work%w3(l) = merge(merge(w3, w1, form > 0.0_wp), work%w3(l), work%long(l) > 0.0_wp)
         end do
     end subroutine long_steps
+
+    !> The angles of the lanes whose triple was doubled at least n times: y, z before, s/z, c/z, d/z after.
+    pure subroutine double_angles(n, doublings, nu, bg, old_y, old_z, s, c, d, z, ec, es)
+        real(wp), intent(in) :: n, doublings(lanes)
+        real(wp), intent(in) :: nu(lanes), bg(lanes), old_y(lanes), old_z(lanes)
+        real(wp), intent(in) :: s(lanes), c(lanes), d(lanes), z(lanes)
+        real(wp), intent(inout) :: ec(lanes), es(lanes)
+        real(wp) :: new_ec, new_es
+        integer :: l
+
+        do l = 1, lanes
+            new_ec = ec(l)
+            new_es = es(l)
+            call double_angle(nu(l), bg(l), old_y(l), old_z(l), s(l), c(l)*d(l), z(l), new_ec, new_es)
+            ec(l) = merge(new_ec, ec(l), doublings(l) >= n)
+            es(l) = merge(new_es, es(l), doublings(l) >= n)
+        end do
+    end subroutine double_angles
 
     !> Numerators over a denominator that has become small, and with them the angle, of order one again.
     pure subroutine form_anew(s, c, d, z, ec, es)

@@ -75,7 +75,8 @@ contains
     !> Period 4 K(k)/lambda and precession, theta(T) = G T (a1 - beta nu <s^2/(1 + nu s^2)>), or mirrored.
     subroutine set_up_period(motion)
         type(free_motion), intent(inout) :: motion
-        real(wp) :: n(3), a(3), alpha, beta, gamma, g, pt, rt, p, r, delta, nu, quarter, mean
+        real(wp) :: n(3), a(3), alpha, beta, gamma, alpha_t, beta_t, gamma_t, g, gg, p, r, nu_first, nu_mirror
+        real(wp) :: delta, nu, quarter, mean
         integer, parameter :: largest_exponent = 900    ! periods beyond 2^900 or under 2^-900 are of no use
         integer :: em, ea
         logical :: first_form
@@ -92,15 +93,14 @@ contains
             beta = scale(body%beta, -ea)
             gamma = scale(body%gamma, -ea)
         end associate
-        g = norm3(n)
-        pt = beta*n(1)**2 + alpha*n(2)**2
-        rt = gamma*n(2)**2 + beta*n(3)**2
-        p = gamma*pt
-        r = alpha*rt
+        ! With t = 1, alpha t is alpha.
+        call orbit_constants(alpha, beta, gamma, 1.0_wp, n(1), n(2), n(3), alpha_t, beta_t, gamma_t, gg, &
+                             p, r, nu_first, nu_mirror)
+        g = sqrt(gg)
         delta = beta*((alpha*n(3)**2) - (gamma*n(1)**2))     ! exactly 0 on the separatrix, with FMA too
         if (abs(delta) <= 0.0_wp) return
-        first_form = gamma*rt <= alpha*pt
-        nu = merge(gamma*rt, alpha*pt, first_form)
+        first_form = nu_first <= nu_mirror
+        nu = min(nu_first, nu_mirror)
         call quarter_period(max(p, r), abs(delta), nu, .true., quarter, mean)
         if (abs(exponent(quarter) - (em + ea)) > largest_exponent) return
         motion%periodic = .true.
@@ -222,5 +222,7 @@ contains
 
         norm = sqrt(sum(scale(q, -exponent(maxval(abs(q))))**2))
     end function norm4
+
+    include 'orbit_formulas.inc'
 
 end module frb_free_motion
