@@ -56,6 +56,7 @@ program check
         call t%ok('this-check-fails-on-purpose', .false.)
         call t%close_suite()
     end if
+    if (t%skipped > 0) write (output_unit, '(i0,a)') t%skipped, ' skipped'
     write (output_unit, '(i0,a,i0,a)') t%passed, ' passed, ', t%failed, ' failed'
     if (t%failed > 0) error stop 1
 end program check

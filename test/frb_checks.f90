@@ -1,7 +1,7 @@
 !> A small check module: named checks, counted, each failure printed with got, expected, error, tolerance.
 !>
 !> A suite opens with the number of checks it is going to make; a different count at its end is a failure,
-!> so a test that silently does not run makes the suite red.
+!> so a test that silently does not run makes the suite red. What cannot run here is counted as skipped and named.
 module frb_checks
     use, intrinsic :: iso_fortran_env, only: output_unit
     use frb_kinds, only: wp
@@ -13,12 +13,14 @@ module frb_checks
     type :: tally
         integer :: passed = 0
         integer :: failed = 0
+        integer :: skipped = 0
         integer, private :: announced = 0
         integer, private :: at_opening = 0
         character(:), allocatable, private :: suite
     contains
         procedure :: open_suite
         procedure :: close_suite
+        procedure :: provided
         procedure :: ok
         procedure, private :: close_scalar
         procedure, private :: close_vector
@@ -37,7 +39,7 @@ contains
 
         self%suite = name
         self%announced = checks
-        self%at_opening = self%passed + self%failed
+        self%at_opening = self%passed + self%failed + self%skipped
         write (output_unit, '(a,i0,a)') 'suite '//name//' (', checks, ')'
     end subroutine open_suite
 
@@ -46,7 +48,7 @@ contains
         class(tally), intent(inout) :: self
         integer :: made
 
-        made = self%passed + self%failed - self%at_opening
+        made = self%passed + self%failed + self%skipped - self%at_opening
         if (made /= self%announced) then
             self%failed = self%failed + 1
             write (output_unit, '(a,i0,a,i0)') '  FAILED '//self%suite//': made ', made, &
@@ -54,6 +56,20 @@ contains
         end if
         flush (output_unit)
     end subroutine close_suite
+
+    !> Whether `checks` checks that need something can be made; if not, they count as skipped.
+    function provided(self, there, checks, name) result(can)
+        class(tally), intent(inout) :: self
+        logical, intent(in) :: there            !! what they need is there
+        integer, intent(in) :: checks
+        character(*), intent(in) :: name        !! what they are and what they need
+        logical :: can
+
+        can = there
+        if (there) return
+        self%skipped = self%skipped + checks
+        write (output_unit, '(a,i0,a)') '  skipped ', checks, ': '//name
+    end function provided
 
     !> The statement `name` holds when `condition` does.
     subroutine ok(self, name, condition)

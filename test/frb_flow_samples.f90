@@ -1,10 +1,10 @@
 !> What the suites of the free flow share: random motions, their truth with its inherent sensitivity, calls
 !> that leave their input alone.
 module frb_flow_samples
-    use, intrinsic :: iso_fortran_env, only: int64, qp => real128
+    use, intrinsic :: iso_fortran_env, only: int64
     use frb_free_flow, only: free_flow
     use frb_inertia, only: rigid_body
-    use frb_kinds, only: wp, pi, unit_roundoff
+    use frb_kinds, only: wp, qp, pi, unit_roundoff
     use frb_quad_truth, only: long_truth
     use frb_reference_cases, only: reference_case
     use frb_rotations, only: norm3, quat_rotate
@@ -88,8 +88,8 @@ contains
         m(2) = sign(sqrt(max(0.0_wp, 1 - m(1)**2 - m(3)**2)), random%uniform(-1.0_wp, 1.0_wp))
     end function near_separatrix
 
-    !> The exact motion after h from the identity, by Taylor series in quadruple precision, and how much it
-    !> changes, summed over the seven inputs, when one of them grows by a relative 2^-53.
+    !> The exact motion after h from the identity, by Taylor series in quadruple precision (without one
+    !> the series does not end: ask `has_quad`), and how much it changes, summed over the seven inputs, when one of them grows by a relative 2^-53.
     pure function true_case(moments, m0, h) result(item)
         real(wp), intent(in) :: moments(3), m0(3), h
         type(reference_case) :: item

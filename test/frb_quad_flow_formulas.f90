@@ -1,6 +1,6 @@
 !> The formulas of the free flow in quadruple precision: the very text that the library compiles.
 module frb_quad_flow_formulas
-    use, intrinsic :: iso_fortran_env, only: wp => real128
+    use frb_kinds, only: wp => qp
     implicit none
     private
 

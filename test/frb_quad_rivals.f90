@@ -1,7 +1,7 @@
 !> The rivals of the charts in quadruple precision: the very texts that the chart program times.
 !> fpm does not watch included text: after a change of it, build afresh.
 module frb_quad_dmv
-    use, intrinsic :: iso_fortran_env, only: rk => real128
+    use frb_kinds, only: rk => qp
     implicit none
     private
 
@@ -12,7 +12,7 @@ module frb_quad_dmv
 end module frb_quad_dmv
 
 module frb_quad_rotations
-    use, intrinsic :: iso_fortran_env, only: rk => real128
+    use frb_kinds, only: rk => qp
     implicit none
     private
 
@@ -23,7 +23,7 @@ module frb_quad_rotations
 end module frb_quad_rotations
 
 module frb_quad_runge_kutta
-    use, intrinsic :: iso_fortran_env, only: rk => real128
+    use frb_kinds, only: rk => qp
     implicit none
     private
 
@@ -34,7 +34,7 @@ module frb_quad_runge_kutta
 end module frb_quad_runge_kutta
 
 module frb_quad_truth
-    use, intrinsic :: iso_fortran_env, only: qp => real128
+    use frb_kinds, only: qp
     implicit none
     private
 
@@ -45,7 +45,7 @@ module frb_quad_truth
 end module frb_quad_truth
 
 module frb_quad_top
-    use, intrinsic :: iso_fortran_env, only: qp => real128
+    use frb_kinds, only: qp
     implicit none
     private
 

@@ -1,15 +1,13 @@
 !> Reads reference cases (data/reference) and scores results against them, in units of the inherent
 !> sensitivity: 1 is what rounding the inputs costs anyone.
 module frb_reference_cases
-    use frb_kinds, only: wp, unit_roundoff
+    use frb_kinds, only: wp, qp, unit_roundoff
     implicit none
     private
 
     public :: reference_case, read_cases, score_momentum, score_attitude, median
 
-    !> 25 digits are kept: scoring in double precision would add half a unit of its own.
-    integer, parameter :: qp = selected_real_kind(30)
-
+    !> Kept to 25 digits where the compiler can: scoring in double precision adds half a unit of its own.
     type :: reference_case
         character(20) :: group = ''
         real(wp) :: moments(3) = 0.0_wp

@@ -1,14 +1,13 @@
 !> free_flow: the laws any flow of the free rigid body obeys, other names and other axes, agreement with the
 !> steps of the paper and with Taylor series, relative accuracy of small increments.
 module frb_test_flow_laws
-    use, intrinsic :: iso_fortran_env, only: qp => real128
     use frb_checks, only: tally
     use frb_flow_limits, only: tiny_limit, short_limit, middle_limit, square_limit, period_limit, &
         tiny_turn_limit, small_turn_limit, middle_turn_limit
     use frb_flow_samples, only: stream, true_case, advanced, settled, near_separatrix, defect, no_turn
     use frb_free_flow, only: free_flow
     use frb_inertia, only: rigid_body
-    use frb_kinds, only: wp
+    use frb_kinds, only: wp, qp, has_quad
     use frb_matrix_step, only: frb_step
     use frb_quad_truth, only: taylor_flow
     use frb_quat_step, only: quat_step
@@ -61,8 +60,8 @@ contains
         call check_ways(t, samples)
         call check_tensor(t, samples)
         call check_paper_steps(t, samples)
-        call check_taylor(t)
-        call check_increments(t)
+        if (t%provided(has_quad, 6, 'agreement with Taylor series, which needs 30 digits')) call check_taylor(t)
+        if (t%provided(has_quad, 3, 'increments, which need 30 digits')) call check_increments(t)
         call t%close_suite()
     end subroutine test_flow_laws
 

@@ -12,6 +12,7 @@ program frb_charts
     use frb_chart_top, only: chart_heavy_top, chart_torus
     use frb_chart_torque, only: chart_torque
     use frb_chart_triangle, only: chart_triangle
+    use frb_kinds, only: has_quad
     use, intrinsic :: iso_c_binding, only: c_int
     use, intrinsic :: iso_fortran_env, only: error_unit
     implicit none
@@ -60,6 +61,7 @@ program frb_charts
         call list_charts()
         stop
     end if
+    if (.not. has_quad) call refuse('the truth needs a compiler with quadruple precision')
     if (index(options%folder, "'") > 0) call refuse('a quote in the name of the folder')
     call execute_command_line('mkdir -p '''//options%folder//'''', exitstat=code)
     if (code /= 0) call refuse('cannot make the folder '//options%folder)

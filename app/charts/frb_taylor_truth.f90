@@ -1,7 +1,7 @@
 !> The truth of every chart: a Taylor-series integration in quadruple precision, independent of every formula
 !> of the library.
 module frb_taylor_truth
-    use, intrinsic :: iso_fortran_env, only: qp => real128
+    use frb_kinds, only: qp
     implicit none
     private
 

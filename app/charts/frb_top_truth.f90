@@ -1,6 +1,6 @@
 !> The truth of the charts with torque: a heavy top by Taylor series in quadruple precision.
 module frb_top_truth
-    use, intrinsic :: iso_fortran_env, only: qp => real128
+    use frb_kinds, only: qp
     implicit none
     private
 

@@ -1,13 +1,18 @@
-!> The one real kind of the library, and the constants that belong to it.
+!> The one real kind of the library, the constants that belong to it, and the kind of what checks it.
 module frb_kinds
-    use, intrinsic :: iso_fortran_env, only: real64
+    use, intrinsic :: iso_fortran_env, only: real64, real128
     implicit none
     private
 
-    public :: wp, pi, half_pi, two_pi, unit_roundoff
+    public :: wp, qp, has_quad, pi, half_pi, two_pi, unit_roundoff
 
     !> Working precision: IEEE double.
     integer, parameter :: wp = real64
+
+    !> Quadruple precision, for the truth of tests and charts; `wp` again where the compiler has none: checks
+    !> that need 30 digits ask `has_quad`.
+    integer, parameter :: qp = merge(real128, real64, real128 > 0)
+    logical, parameter :: has_quad = precision(1.0_qp) >= 30
 
     real(wp), parameter :: pi = 3.14159265358979323846264338327950288_wp
     real(wp), parameter :: half_pi = 1.57079632679489661923132169163975144_wp
