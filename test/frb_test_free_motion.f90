@@ -6,10 +6,11 @@ module frb_test_free_motion
     use frb_inertia, only: rigid_body
     use frb_kinds, only: wp, pi, two_pi
     use frb_reference_cases, only: reference_case, read_cases, score_momentum, score_attitude
-    use frb_rotations, only: quat_conjugate, quat_product, quat_rotate
+    use frb_rotations, only: cross, quat_conjugate, quat_product, quat_rotate
     use frb_status, only: status_ok, status_bad_moments, status_bad_momentum, status_bad_attitude, &
         status_bad_count, status_bad_time
-    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_value, ieee_quiet_nan
+    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_is_nan, ieee_value, &
+        ieee_quiet_nan
     implicit none
     private
 
@@ -30,7 +31,7 @@ contains
         integer :: i, stat
         logical :: same
 
-        call t%open_suite('free-motion', 23)
+        call t%open_suite('free-motion', 50)
         nan = ieee_value(1.0_wp, ieee_quiet_nan)
         call read_cases('data/reference/cases.txt', cases)
         worst_m = 0.0_wp
@@ -104,6 +105,8 @@ contains
         call motion%at(1.0_wp, m, q, stat)
         call t%ok('period-that-underflows-does-no-harm', stat == status_ok .and. .not. motion%periodic &
                   .and. all(ieee_is_finite(q)))
+        call check_precession(t)
+        call check_published_periods(t)
         call t%close_suite()
     end subroutine test_free_motion
 
@@ -127,5 +130,105 @@ contains
         call t%ok('momentum-is-back-and-attitude-turned-after-the-period-'//name, &
                   all(abs(m - m0) <= tolerance*maxval(abs(m0))) .and. all(abs(change(2:4)) <= tolerance))
     end subroutine check_period
+
+    !> The precession is the way of the long axis round the momentum, followed from point to point of a period.
+    subroutine check_precession(t)
+        type(tally), intent(inout) :: t
+        type(free_motion) :: motion
+        real(wp), parameter :: tilted(3, 3) = reshape( &
+            [2.5_wp, 0.0_wp, 0.5_wp, 0.0_wp, 2.0_wp, 0.0_wp, 0.5_wp, 0.0_wp, 2.5_wp], [3, 3])   ! 2, 2 and 3
+        real(wp) :: rate
+
+        call check_way(t, [1.0_wp, 2.0_wp, 3.0_wp], [0.9_wp, 0.2_wp, 0.1_wp], 'turning-about-the-long-axis')
+        call check_way(t, [1.0_wp, 2.0_wp, 3.0_wp], [0.9_wp, 0.9_wp, 0.4_wp], 'far-from-the-long-axis')
+        call check_way(t, [1.0_wp, 2.0_wp, 3.0_wp], [0.1_wp, 0.2_wp, 0.9_wp], 'turning-about-the-short-axis')
+        call check_way(t, [1.0_wp, 2.0_wp, 3.0_wp], [0.9_wp, 0.6_wp, -0.9_wp], 'far-from-the-short-axis')
+        call check_way(t, [3.0_wp, 1.0_wp, 2.0_wp], [0.1_wp, -0.9_wp, 0.3_wp], 'with-the-long-axis-second')
+        call check_way(t, [2.0_wp, 3.0_wp, 0.5_wp], [0.4_wp, 0.9_wp, 0.5_wp], 'with-the-long-axis-third')
+        call check_way(t, [1.0_wp, 100.0_wp, 100.5_wp], [0.9_wp, 0.2_wp, 0.1_wp], 'of-a-rod-about-its-axis')
+        call check_way(t, [1.0_wp, 100.0_wp, 100.0_wp], [0.9_wp, 0.2_wp, 0.1_wp], 'of-a-symmetric-rod')
+        call check_way(t, [2.0_wp, 2.0001_wp, 3.0_wp], [0.1_wp, 0.3_wp, 0.9_wp], 'of-a-body-nearly-oblate')
+
+        ! |m| T/I1 about the symmetry axis of an oblate body, by its moments and by its tensor.
+        motion = free_motion(rigid_body([2.0_wp, 2.0_wp, 3.0_wp]), [0.0_wp, 0.6_wp, 0.1_wp], start)
+        rate = sqrt(0.37_wp)/2
+        call t%close_to('disc-precesses-about-its-symmetry-axis', motion%precession_period(), two_pi/rate, &
+                        16*eps*two_pi/rate)
+        motion = free_motion(rigid_body(tilted), [0.1_wp, 0.6_wp, 0.2_wp], start)
+        rate = sqrt(0.41_wp)/2
+        call t%close_to('disc-by-its-tensor-precesses-about-its-symmetry-axis', motion%precession_period(), &
+                        two_pi/rate, 64*eps*two_pi/rate)
+        motion = free_motion(rigid_body([2.0_wp, 3.0_wp, 6.0_wp]), [0.4_wp, 0.8_wp, 0.4_wp], unit)
+        call t%ok('no-precession-on-the-separatrix', ieee_is_nan(motion%precession()) &
+                  .and. .not. ieee_is_finite(motion%precession_period()))
+    end subroutine check_precession
+
+    subroutine check_way(t, moments, m0, name)
+        type(tally), intent(inout) :: t
+        real(wp), intent(in) :: moments(3), m0(3)
+        character(*), intent(in) :: name
+        integer, parameter :: points = 400
+        type(free_motion) :: motion
+        real(wp) :: m(3), q(4), pole(3), zero(3), ninety(3), long(3), now, before, way
+        integer :: i
+
+        motion = free_motion(rigid_body(moments), m0, start)
+        pole = quat_rotate(start, m0/norm2(m0))
+        long = 0.0_wp
+        long(minloc(moments, 1)) = 1.0_wp
+        zero = quat_rotate(start, long)
+        zero = zero - dot_product(zero, pole)*pole
+        ninety = cross(pole, zero)
+        way = 0.0_wp
+        before = 0.0_wp
+        do i = 1, points
+            call motion%at(motion%period()*i/points, m, q)
+            associate (axis => quat_rotate(q, long))
+                now = atan2(dot_product(axis, ninety), dot_product(axis, zero))
+            end associate
+            way = way + modulo(now - before + pi, two_pi) - pi
+            before = now
+        end do
+        call t%close_to('precession-is-the-way-of-the-long-axis-'//name, motion%precession(), way, &
+                        64*eps*points)
+        call t%close_to('precession-period-is-the-mean-'//name, motion%precession_period(), &
+                        two_pi*motion%period()/way, 64*eps*points*motion%precession_period())
+    end subroutine check_way
+
+    !> Toutatis: moments and rates of 1992-11-09 after Takahashi, Busch and Scheeres (2013), periods of Hudson
+    !> and Ostro (1995), 5.41 and 7.35 d, and of Zhao, Ji et al. (2015), 5.38 and 7.40 d, each within 0.03 d.
+    !> Apophis: Pravec et al. (2014), 263 h and 27.38 h, I1/I3 = 0.61, I2/I3 = 0.965, and an energy of
+    !> 1.024 +- 0.013 times the least for the momentum.
+    subroutine check_published_periods(t)
+        type(tally), intent(inout) :: t
+        real(wp), parameter :: toutatis(3) = [3.0836_wp, 3.235_wp, 1.0_wp]
+        real(wp), parameter :: apophis(3) = [0.61_wp, 0.965_wp, 1.0_wp]
+        real(wp), parameter :: rates(3) = [14.51_wp, 33.529_wp, -98.709_wp]*pi/180      ! [rad/d]
+        type(free_motion) :: motion
+        real(wp) :: m(3), energy, wide
+        integer :: i
+
+        motion = free_motion(rigid_body(toutatis), toutatis*rates, unit)
+        call t%close_to('toutatis-turns-about-its-long-axis-in-5.38-days', motion%period(), 5.38_wp, 0.03_wp)
+        call t%close_to('toutatis-precesses-in-7.40-days', motion%precession_period(), 7.40_wp, 0.03_wp)
+        call t%close_to('period-of-toutatis-by-another-integrator', motion%period(), 5.3685303_wp, 1.0e-7_wp)
+        call t%close_to('precession-of-toutatis-by-another-integrator', motion%precession_period(), &
+                        7.4117_wp, 1.0e-4_wp)
+
+        ! m2 = 0, |m| = 1: 2 T = m1^2/I1 + m3^2/I3 = energy/I3; the ratio grows with the energy.
+        energy = 1.012_wp
+        wide = 0.024_wp
+        do i = 1, 40
+            wide = wide/2
+            m(1) = sqrt((energy + wide - 1)/(1/apophis(1) - 1))
+            m(2) = 0.0_wp
+            m(3) = sqrt(1 - m(1)**2)
+            motion = free_motion(rigid_body(apophis), m, unit)
+            if (motion%period()/motion%precession_period() < 263/27.38_wp) energy = energy + wide
+        end do
+        call t%close_to('periods-of-apophis-give-its-published-energy', energy, 1.024_wp, 0.013_wp)
+        call t%close_to('energy-found-has-the-published-ratio', &
+                        motion%period()/motion%precession_period(), 263/27.38_wp, 1.0e-6_wp)
+    end subroutine check_published_periods
 
 end module frb_test_free_motion

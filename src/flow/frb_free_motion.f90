@@ -7,7 +7,7 @@ module frb_free_motion
     use frb_flow_periods, only: quarter_period
     use frb_free_flow, only: free_flow
     use frb_inertia, only: rigid_body
-    use frb_kinds, only: wp
+    use frb_kinds, only: wp, two_pi
     use frb_rotations, only: norm3, quat_product, quat_rotate
     use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_count, status_bad_momentum, &
         status_bad_time
@@ -27,7 +27,7 @@ module frb_free_motion
         real(wp), private :: q0(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
         real(wp), private :: axis(3) = 0.0_wp       !! direction of the momentum in space
         real(wp), private :: period_of_m = 0.0_wp
-        real(wp), private :: half_angle = 0.0_wp    !! half the precession, the turn of q in a period
+        real(wp), private :: half_angle = 0.0_wp    !! half the turn about the momentum in a period
         real(wp), private :: turns_sign = 1.0_wp    !! -1 when q changes sign besides
     contains
         procedure, private :: at_time
@@ -35,7 +35,21 @@ module frb_free_motion
         generic :: at => at_time, at_times
         procedure :: period
         procedure :: precession
+        procedure :: precession_period
     end type free_motion
+
+    !> Constants of an orbit in scaled units.
+    type :: orbit
+        integer :: exponent = 0
+        real(wp) :: a(3) = 0.0_wp       !! 1/I, sorted
+        real(wp) :: beta = 0.0_wp       !! a(1) - a(3)
+        real(wp) :: g = 0.0_wp          !! |m|
+        real(wp) :: larger = 0.0_wp     !! max(P, R)
+        real(wp) :: delta = 0.0_wp      !! R - P
+        real(wp) :: nu_first = 0.0_wp   !! parameter of the third kind, and that of the mirror image
+        real(wp) :: nu_mirror = 0.0_wp
+        logical :: first_form = .true.
+    end type orbit
 
     interface free_motion
         module procedure motion_from_state
@@ -75,44 +89,54 @@ contains
     !> Period 4 K(k)/lambda and precession, theta(T) = G T (a1 - beta nu <s^2/(1 + nu s^2)>), or mirrored.
     subroutine set_up_period(motion)
         type(free_motion), intent(inout) :: motion
-        real(wp) :: n(3), a(3), alpha, beta, gamma, alpha_t, beta_t, gamma_t, g, gg, p, r, nu_first, nu_mirror
-        real(wp) :: delta, nu, quarter, mean
+        type(orbit) :: path
+        real(wp) :: nu, quarter, mean
         integer, parameter :: largest_exponent = 900    ! periods beyond 2^900 or under 2^-900 are of no use
+
+        path = orbit_of(motion)
+        if (abs(path%delta) <= 0.0_wp) return
+        nu = min(path%nu_first, path%nu_mirror)
+        call quarter_period(path%larger, abs(path%delta), nu, .true., quarter, mean)
+        if (abs(exponent(quarter) - path%exponent) > largest_exponent) return
+        motion%periodic = .true.
+        if (path%first_form) then
+            motion%half_angle = 2*quarter*path%g*(path%a(1) - path%beta*nu*mean)
+            motion%turns_sign = merge(1.0_wp, -1.0_wp, path%delta <= 0.0_wp)
+        else
+            motion%half_angle = 2*quarter*path%g*(path%a(3) + path%beta*nu*mean)
+            motion%turns_sign = merge(-1.0_wp, 1.0_wp, path%delta <= 0.0_wp)
+        end if
+        motion%period_of_m = scale(4*quarter, -path%exponent)
+    end subroutine set_up_period
+
+    !> The constants of the motion, momentum and moments scaled by powers of 2, so that no norm is too large
+    !> or too small: times are in units of 2^-exponent.
+    pure function orbit_of(motion) result(path)
+        type(free_motion), intent(in) :: motion
+        type(orbit) :: path
+        real(wp) :: n(3), alpha, beta, gamma, alpha_t, gamma_t, gg, p, r
         integer :: em, ea
-        logical :: first_form
 
         associate (body => motion%body)
             n = motion%m0
             if (body%turned) n = matmul(n, body%axes)
-            ! Momentum and moments scaled by powers of 2, so that no norm is too large or too small.
             em = exponent(maxval(abs(n)))
             ea = exponent(body%a(1))
             n = scale(n(body%order), -em)
-            a = scale(body%a, -ea)
+            path%a = scale(body%a, -ea)
             alpha = scale(body%alpha, -ea)
             beta = scale(body%beta, -ea)
             gamma = scale(body%gamma, -ea)
         end associate
+        path%exponent = em + ea
         ! With t = 1, alpha t is alpha.
-        call orbit_constants(alpha, beta, gamma, 1.0_wp, n(1), n(2), n(3), alpha_t, beta_t, gamma_t, gg, &
-                             p, r, nu_first, nu_mirror)
-        g = sqrt(gg)
-        delta = beta*((alpha*n(3)**2) - (gamma*n(1)**2))     ! exactly 0 on the separatrix, with FMA too
-        if (abs(delta) <= 0.0_wp) return
-        first_form = nu_first <= nu_mirror
-        nu = min(nu_first, nu_mirror)
-        call quarter_period(max(p, r), abs(delta), nu, .true., quarter, mean)
-        if (abs(exponent(quarter) - (em + ea)) > largest_exponent) return
-        motion%periodic = .true.
-        if (first_form) then
-            motion%half_angle = 2*quarter*g*(a(1) - beta*nu*mean)
-            motion%turns_sign = merge(1.0_wp, -1.0_wp, delta <= 0.0_wp)
-        else
-            motion%half_angle = 2*quarter*g*(a(3) + beta*nu*mean)
-            motion%turns_sign = merge(-1.0_wp, 1.0_wp, delta <= 0.0_wp)
-        end if
-        motion%period_of_m = scale(4*quarter, -(em + ea))
-    end subroutine set_up_period
+        call orbit_constants(alpha, beta, gamma, 1.0_wp, n(1), n(2), n(3), alpha_t, path%beta, gamma_t, gg, &
+                             p, r, path%nu_first, path%nu_mirror)
+        path%g = sqrt(gg)
+        path%larger = max(p, r)
+        path%delta = beta*((alpha*n(3)**2) - (gamma*n(1)**2))   ! exactly 0 on the separatrix, with FMA too
+        path%first_form = path%nu_first <= path%nu_mirror
+    end function orbit_of
 
     !> m, and q when present, at the time t of either sign.
     subroutine at_time(self, t, m, q, stat)
@@ -205,15 +229,62 @@ contains
         if (self%periodic) time = self%period_of_m
     end function period
 
-    !> Angle about the momentum, right-handed, by which the body has turned after one period [rad]; it is
-    !> defined modulo 2 pi. NaN where there is no period.
+    !> Angle about the momentum, right-handed and > 0, by which the axis of least moment (an asteroid's long
+    !> axis) goes round in one period, whole turns counted [rad]; modulo 2 pi it is the turn of the body after
+    !> a period. The axis of largest moment goes round 2 pi further. A body whose two lesser moments are equal
+    !> has its symmetry axis in the place of the long one: the angle is then |m| T/I1. NaN without a period.
+    !> Accuracy: 1e-14 relative.
     pure function precession(self) result(angle)
         class(free_motion), intent(in) :: self
         real(wp) :: angle
 
         angle = ieee_value(1.0_wp, ieee_quiet_nan)
-        if (self%periodic) angle = 2*self%half_angle
+        if (self%periodic) angle = whole_angle(self)
     end function precession
+
+    !> Mean time in which the axis of `precession` goes once round the momentum, 2 pi T/angle: what is
+    !> published as P_phi of a tumbling asteroid, beside `period`, its P_psi. Inf where there is no period.
+    pure function precession_period(self) result(time)
+        class(free_motion), intent(in) :: self
+        real(wp) :: time
+
+        time = ieee_value(1.0_wp, ieee_positive_inf)
+        if (self%periodic) time = two_pi*(self%period_of_m/whole_angle(self))
+    end function precession_period
+
+    !> The azimuth of axis 1 of the sorted body about the momentum grows in a period by the mirror form,
+    !> G T (a3 + beta <nu s^2/(1 + nu s^2)>), a sum of positive terms; that of axis 3 by the first, 2 pi more.
+    pure function whole_angle(motion) result(angle)
+        type(free_motion), intent(in) :: motion
+        real(wp) :: angle
+        real(wp), parameter :: few_halvings = 1024.0_wp
+        type(orbit) :: path
+        real(wp) :: quarter, mean
+
+        path = orbit_of(motion)
+        angle = 2*motion%half_angle
+        if (lesser_moments_are_equal(motion%body)) then
+            if (.not. path%first_form) angle = angle + two_pi
+        else if (path%first_form) then
+            if (path%nu_mirror > few_halvings*path%larger) then
+                angle = angle - two_pi      ! a long period: the angle is many turns, nothing cancels
+            else
+                call quarter_period(path%larger, abs(path%delta), path%nu_mirror, .true., quarter, mean)
+                angle = 4*quarter*path%g*(path%a(3) + path%beta*path%nu_mirror*mean)
+            end if
+        end if
+    end function whole_angle
+
+    !> Equal as they were given, or within the rounding of a tensor's moments, some units of the largest one.
+    pure function lesser_moments_are_equal(body) result(equal)
+        type(rigid_body), intent(in) :: body
+        logical :: equal
+        real(wp), parameter :: rounding_of_tensors = 8*epsilon(1.0_wp)
+        real(wp) :: moments(3)
+
+        moments = body%moments(body%order)
+        equal = moments(2) - moments(1) <= merge(rounding_of_tensors*moments(3), 0.0_wp, body%turned)
+    end function lesser_moments_are_equal
 
     !> Norm of a quaternion scaled to the middle of the exponents.
     pure function norm4(q) result(norm)
