@@ -1,7 +1,8 @@
 !> A small check module: named checks, counted, each failure printed with got, expected, error, tolerance.
 !>
 !> A suite opens with the number of checks it is going to make; a different count at its end is a failure,
-!> so a test that silently does not run makes the suite red. What cannot run here is counted as skipped and named.
+!> so a test that silently does not run makes the suite red. What cannot run
+!> here is counted as skipped and named.
 module frb_checks
     use, intrinsic :: iso_fortran_env, only: output_unit
     use frb_kinds, only: wp

@@ -89,7 +89,8 @@ contains
     end function near_separatrix
 
     !> The exact motion after h from the identity, by Taylor series in quadruple precision (without one
-    !> the series does not end: ask `has_quad`), and how much it changes, summed over the seven inputs, when one of them grows by a relative 2^-53.
+    !> the series does not end: ask `has_quad`), and how much it changes, summed over the seven
+    !> inputs, when one of them grows by a relative 2^-53.
     pure function true_case(moments, m0, h) result(item)
         real(wp), intent(in) :: moments(3), m0(3), h
         type(reference_case) :: item

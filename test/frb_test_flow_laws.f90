@@ -60,7 +60,7 @@ contains
         call check_ways(t, samples)
         call check_tensor(t, samples)
         call check_paper_steps(t, samples)
-        if (t%provided(has_quad, 6, 'agreement with Taylor series, which needs 30 digits')) call check_taylor(t)
+        if (t%provided(has_quad, 6, 'Taylor series, which need 30 digits')) call check_taylor(t)
         if (t%provided(has_quad, 3, 'increments, which need 30 digits')) call check_increments(t)
         call t%close_suite()
     end subroutine test_flow_laws

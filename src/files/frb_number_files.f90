@@ -163,13 +163,15 @@ contains
     subroutine next_line(self, error)
         class(number_file), intent(inout) :: self
         character(:), allocatable, intent(out) :: error
-        character(512) :: part
-        integer :: io, length, comment
+        character(:), allocatable :: line, longer
+        integer :: io, length, used, comment
 
         self%line = ''
         self%position = 1
+        allocate (character(512) :: line)
+        used = 0
         do
-            read (self%unit, '(a)', advance='no', size=length, iostat=io) part
+            read (self%unit, '(a)', advance='no', size=length, iostat=io) line(used + 1:)
             if (is_iostat_end(io)) then
                 self%at_end = .true.
                 return
@@ -178,17 +180,22 @@ contains
                 error = self%path//': cannot be read'
                 return
             end if
-            self%line = self%line//part(:length)
+            used = used + length
             if (is_iostat_eor(io)) exit
-            if (len(self%line) > longest_line) then
+            if (used > longest_line) then
                 self%line_number = self%line_number + 1
                 error = self%complaint('line', 'at most 100000 characters', 'more')
                 return
             end if
+            ! Doubled, not joined: the part of a line read so far is copied few times, never to the stack.
+            allocate (character(2*len(line)) :: longer)
+            longer(:used) = line
+            call move_alloc(longer, line)
         end do
         self%line_number = self%line_number + 1
-        comment = scan(self%line, '#!')
-        if (comment > 0) self%line = self%line(:comment - 1)
+        comment = scan(line(:used), '#!')
+        if (comment > 0) used = comment - 1
+        self%line = line(:used)
     end subroutine next_line
 
     !> Whether a character separates words: blank, tab, or the carriage return of a foreign line end.
