@@ -1,4 +1,5 @@
-!> The public interface of the library: the exact motion of a free rigid body.
+!> The public interface of the library: the exact motion of a free rigid body. All names listed here are
+!> public. Import those you use, as the first example does: `use frb, only: wp, rigid_body, free_flow`.
 module frb
     use frb_kinds, only: wp
     use frb_status, only: status_message, status_ok, status_bad_moments, status_bad_tensor, &
@@ -10,10 +11,9 @@ module frb
     use frb_quat_step, only: quat_step
     use frb_free_flow, only: free_flow
     use frb_free_motion, only: free_motion
-    use frb_carlson, only: rf, rc, rj, rd
-    use frb_agm, only: ellip_k, ellip_f, jacobi_am, jacobi, landen_step
-    use frb_legendre, only: ellpi, ellint_pi, ellint_pi_between
-    use frb_quadrature, only: gauss_legendre, eint_gauss
+    use frb_elliptic, only: carlson_rf => rf, carlson_rc => rc, carlson_rj => rj, carlson_rd => rd, &
+        jacobi_functions => jacobi, ellip_k, ellip_f, jacobi_am, landen_step, ellpi, ellint_pi, &
+        ellint_pi_between, gauss_legendre, eint_gauss
     use frb_order_conditions, only: order_report, order_conditions
     use frb_schemes, only: splitting_scheme, scheme_names, mirrored
     use frb_torque, only: body_scene, group_scene, body_observer, group_observer, body_drift
@@ -22,22 +22,6 @@ module frb
     use frb_splitting, only: integrate
     use frb_invariants, only: kinetic_energy, total_energy, spatial_momentum, norm_defect, invariant_monitor
     implicit none
-    private
-
-    public :: wp, frb_step, quat_step
-    public :: status_message, status_ok, status_bad_moments, status_bad_tensor
-    public :: status_bad_momentum, status_bad_attitude, status_bad_time, status_bad_count, status_bad_option
-    public :: status_bad_torque, status_bad_scheme, status_no_period, status_lapack_failed
-    public :: quat_product, quat_conjugate, quat_rotate, quat_to_matrix, matrix_to_quat
-    public :: rigid_body, principal_axes, free_flow, free_motion
-    public :: rf, rc, rj, rd
-    public :: ellip_k, ellip_f, jacobi_am, jacobi, landen_step
-    public :: ellpi, ellint_pi, ellint_pi_between
-    public :: gauss_legendre, eint_gauss
-    public :: splitting_scheme, scheme_names, mirrored, order_report, order_conditions
-    public :: body_scene, group_scene, body_observer, group_observer, body_drift, heavy_top, plain_scene
-    public :: flow_drift, matrix_drift, quaternion_drift, drift_by_name
-    public :: integrate
-    public :: kinetic_energy, total_energy, spatial_momentum, norm_defect, invariant_monitor
+    public
 
 end module frb
