@@ -25,8 +25,8 @@ program example3_inertia_tensor
 
     ! A body is made once and used for every step. Refused input shows in its status.
     body = rigid_body(tensor)
-    if (body%status /= 0) then
-        print '(a)', status_message(body%status)
+    if (body%status() /= 0) then
+        print '(a)', status_message(body%status())
         error stop
     end if
 

@@ -6,10 +6,10 @@ module frb
         status_bad_momentum, status_bad_attitude, status_bad_time, status_bad_count, status_bad_option, &
         status_bad_torque, status_bad_scheme, status_no_period, status_lapack_failed
     use frb_rotations, only: quat_product, quat_conjugate, quat_rotate, quat_to_matrix, matrix_to_quat
-    use frb_inertia, only: rigid_body, principal_axes
+    use frb_inertia, only: principal_axes
     use frb_matrix_step, only: frb_step
     use frb_quat_step, only: quat_step
-    use frb_free_flow, only: free_flow
+    use frb_free_flow, only: free_flow, rigid_body
     use frb_free_motion, only: free_motion
     use frb_elliptic, only: carlson_rf => rf, carlson_rc => rc, carlson_rj => rj, carlson_rd => rd, &
         jacobi_functions => jacobi, ellip_k, ellip_f, jacobi_am, landen_step, ellpi, ellint_pi, &

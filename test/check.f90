@@ -4,6 +4,7 @@ program check
     use, intrinsic :: iso_fortran_env, only: output_unit
     use frb_checks, only: tally
     use frb_test_base, only: test_base
+    use frb_test_bodies, only: test_bodies
     use frb_test_free_motion, only: test_free_motion
     use frb_test_steps, only: test_steps
     use frb_test_ode45, only: test_ode45
@@ -29,6 +30,7 @@ program check
     character(16) :: argument
 
     call test_base(t)
+    call test_bodies(t)
     call test_free_motion(t)
     call test_steps(t)
     call test_ode45(t)

@@ -2,8 +2,7 @@
 !> that leave their input alone.
 module frb_flow_samples
     use, intrinsic :: iso_fortran_env, only: int64
-    use frb_free_flow, only: free_flow
-    use frb_inertia, only: rigid_body
+    use frb_free_flow, only: free_flow, rigid_body
     use frb_kinds, only: wp, qp, pi, unit_roundoff
     use frb_quad_truth, only: long_truth
     use frb_reference_cases, only: reference_case

@@ -2,7 +2,7 @@
 module frb_test_drifts
     use frb_checks, only: tally
     use frb_drifts, only: drift_by_name, flow_drift, matrix_drift, quaternion_drift
-    use frb_inertia, only: rigid_body
+    use frb_free_flow, only: rigid_body
     use frb_kinds, only: wp
     use frb_scenes, only: heavy_top
     use frb_schemes, only: splitting_scheme

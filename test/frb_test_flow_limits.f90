@@ -5,8 +5,7 @@ module frb_test_flow_limits
     use frb_checks, only: tally
     use frb_flow_samples, only: stream, true_case, advanced, settled, near_separatrix, &
         defect, no_turn, no_rotation
-    use frb_free_flow, only: free_flow
-    use frb_inertia, only: rigid_body
+    use frb_free_flow, only: free_flow, rigid_body
     use frb_kinds, only: wp, qp, has_quad
     use frb_reference_cases, only: reference_case, score_momentum, score_attitude
     use frb_rotations, only: norm3

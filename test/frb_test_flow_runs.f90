@@ -4,8 +4,7 @@ module frb_test_flow_runs
     use frb_checks, only: tally
     use frb_double_dmv, only: dmv_body, new_dmv_body, dmv_steps
     use frb_flow_samples, only: stream, true_case, settled, no_turn, no_rotation
-    use frb_free_flow, only: free_flow
-    use frb_inertia, only: rigid_body
+    use frb_free_flow, only: free_flow, rigid_body
     use frb_kinds, only: wp, unit_roundoff
     use frb_reference_cases, only: reference_case, score_momentum, score_attitude
     use frb_rotations, only: norm3, quat_rotate

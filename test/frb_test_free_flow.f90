@@ -3,8 +3,7 @@
 module frb_test_free_flow
     use frb_checks, only: tally
     use frb_flow_samples, only: settled, no_turn, no_rotation
-    use frb_free_flow, only: free_flow
-    use frb_inertia, only: rigid_body
+    use frb_free_flow, only: free_flow, rigid_body
     use frb_kinds, only: wp
     use frb_reference_cases, only: reference_case, read_cases, score_momentum, score_attitude, median
     use frb_rotations, only: matrix_to_quat

@@ -1,9 +1,8 @@
 !> One motion at many times, its period and its precession.
 module frb_test_free_motion
     use frb_checks, only: tally
-    use frb_free_flow, only: free_flow
+    use frb_free_flow, only: free_flow, rigid_body
     use frb_free_motion, only: free_motion
-    use frb_inertia, only: rigid_body
     use frb_kinds, only: wp, pi, two_pi
     use frb_reference_cases, only: reference_case, read_cases, score_momentum, score_attitude
     use frb_rotations, only: cross, quat_conjugate, quat_product, quat_rotate

@@ -1,7 +1,7 @@
 !> Many bodies under torques: against one at a time, orders, invariants, observers, refused input.
 module frb_test_groups
     use frb_checks, only: tally
-    use frb_inertia, only: rigid_body
+    use frb_free_flow, only: rigid_body
     use frb_invariants, only: kinetic_energy, spatial_momentum, total_energy
     use frb_kinds, only: wp
     use frb_schemes, only: splitting_scheme

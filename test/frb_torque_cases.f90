@@ -1,7 +1,6 @@
 !> Scenes, observers and drifts the suites of the torque layer share, and tops with known end values.
 module frb_torque_cases
-    use frb_free_flow, only: free_flow
-    use frb_inertia, only: rigid_body
+    use frb_free_flow, only: free_flow, rigid_body
     use frb_kinds, only: wp
     use frb_rotations, only: cross, quat_conjugate, quat_product, quat_rotate
     use frb_scenes, only: heavy_top

@@ -192,7 +192,7 @@ contains
             call dmv_steps(self%rival, self%with%option, h, 1, m, q)
             stat = status_ok
         else
-            call advance_once(self%with, body%moments, h, m, q, stat)
+            call advance_once(self%with, body%moments(), h, m, q, stat)
         end if
     end subroutine advance_drift
 

@@ -222,7 +222,7 @@ contains
         integer :: steps(3), repetitions, rounds, pass, i, k, r, stat
 
         item = top_number(1)
-        rival%constants = new_dmv_body(item%body%moments)
+        rival%constants = new_dmv_body(item%body%moments())
         schemes(1) = splitting_scheme([1.0_wp], [0.5_wp, 0.5_wp])
         schemes(2) = splitting_scheme(names(1))
         schemes(3) = splitting_scheme(names(2))
@@ -282,7 +282,7 @@ contains
         real(wp), intent(inout) :: m(3), q(4)
         integer, intent(out) :: stat
 
-        stat = body%status
+        stat = body%status()
         call dmv_steps(self%constants, 10, h, 1, m, q)
     end subroutine advance_by_dmv
 

@@ -6,6 +6,7 @@
 !> Q' = Q hat(omega), and Q m is constant.
 module frb_rotations
     use frb_kinds, only: wp
+    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_quiet_nan, ieee_value
     implicit none
     private
 
@@ -85,14 +86,25 @@ contains
         matrix(3, 3) = 1 - 2*(q(2)*q(2) + q(3)*q(3))
     end function quat_to_matrix
 
-    !> Unit quaternion of a rotation matrix, up to sign; the scalar part comes back non-negative.
+    !> Unit quaternion of a rotation matrix, up to sign; the scalar part comes back non-negative. NaN for a
+    !> matrix whose elements are more than 1e-6 from those of a rotation, such as a reflection.
     pure function matrix_to_quat(matrix) result(q)
         real(wp), intent(in) :: matrix(3, 3)
         real(wp) :: q(4)
+        real(wp), parameter :: tolerance = 1.0e-6_wp, largest_element = 2.0_wp
 
-        q = quat_along(matrix)
-        q = q/sqrt(sum(q**2))
-        if (q(1) < 0.0_wp) q = -q
+        ! Large elements first: their squares may overflow.
+        if (all(ieee_is_finite(matrix))) then
+            if (all(abs(matrix) < largest_element)) then
+                q = quat_along(matrix)
+                if (maxval(abs(q)) > 0.0_wp) then
+                    q = q/sqrt(sum(q**2))
+                    if (q(1) < 0.0_wp) q = -q
+                    if (all(abs(quat_to_matrix(q) - matrix) <= tolerance)) return
+                end if
+            end if
+        end if
+        q = ieee_value(1.0_wp, ieee_quiet_nan)
     end function matrix_to_quat
 
     !> A quaternion of any sign, and of a norm from 1 to 4, of a rotation matrix. Its largest component is

@@ -15,9 +15,9 @@ module frb_status
     public :: status_no_period, status_lapack_failed
 
     integer, parameter :: status_ok = 0             !! done
-    integer, parameter :: status_bad_moments = 1    !! a moment of inertia is not positive and finite
+    integer, parameter :: status_bad_moments = 1    !! moments not finite and positive, nor a linear rotor's
     integer, parameter :: status_bad_tensor = 2     !! inertia tensor not finite, symmetric, positive definite
-    integer, parameter :: status_bad_momentum = 3   !! angular momentum is not finite
+    integer, parameter :: status_bad_momentum = 3   !! angular momentum is not finite, or along a rotor's axis
     integer, parameter :: status_bad_attitude = 4   !! attitude is not finite, or a quaternion of norm zero
     integer, parameter :: status_bad_time = 5       !! time or step is not finite, or zero where it may not be
     integer, parameter :: status_bad_count = 6      !! a number of bodies, points, steps or a size is wrong
@@ -52,11 +52,12 @@ contains
         case (status_ok)
             message = 'no error'
         case (status_bad_moments)
-            message = 'moments of inertia must be positive and finite'
+            message = 'moments of inertia must be finite and positive, or those of a linear rotor'
         case (status_bad_tensor)
-            message = 'the inertia tensor must be finite, symmetric and positive definite'
+            message = 'the inertia tensor must be finite, symmetric and positive definite, or that of a '// &
+                      'linear rotor'
         case (status_bad_momentum)
-            message = 'the angular momentum must be finite'
+            message = 'the angular momentum must be finite, and zero along the axis of a linear rotor'
         case (status_bad_attitude)
             message = 'the attitude must be finite, a quaternion of nonzero norm'
         case (status_bad_time)

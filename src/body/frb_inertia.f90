@@ -1,20 +1,29 @@
-!> The body: its three principal moments in any order, or a full inertia tensor, and the constants every
-!> routine of the flow needs, formed once.
+!> The constants of a body that every routine of the flow needs, formed once, from three principal moments in
+!> any order or from a full inertia tensor.
+!>
+!> Linear rotors (two equal moments, the third 0; a linear molecule): the momentum along the axis of the zero
+!> moment is 0, and then m' = m x I^-1 m = 0 and the angular velocity is m/I, both as for a sphere of moment
+!> I. So the constants are those of that sphere, and the momentum along the axis is checked.
 module frb_inertia
     use frb_kinds, only: wp
     use frb_lapack, only: dsyev
     use frb_rotations, only: cross, matrix_to_quat
-    use frb_status, only: conclude, status_ok, status_bad_moments, status_bad_tensor, status_lapack_failed
+    use frb_status, only: conclude, status_ok, status_bad_moments, status_bad_momentum, status_bad_tensor, &
+        status_lapack_failed
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
     implicit none
     private
 
-    public :: rigid_body, principal_axes, sorting_order
+    public :: body_core, core_from_moments, core_from_tensor, principal_axes, sorting_order
+    public :: keep_off_axis
 
-    !> A rigid body as the flow sees it. Made by `rigid_body(moments)` or `rigid_body(tensor)`; the components
-    !> are for reading. A body that could not be made has `status /= status_ok`, and every routine that takes
-    !> a body refuses it with that code.
-    type :: rigid_body
+    real(wp), parameter :: identity(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, &
+                                                     0.0_wp, 0.0_wp, 1.0_wp], [3, 3])
+    real(wp), parameter :: no_turn(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+
+    !> What `type(rigid_body)` holds. A core that could not be made has `status /= status_ok`, and every
+    !> routine that takes a body refuses it with that code.
+    type :: body_core
         integer :: status = status_bad_moments  !! `status_ok`, or why the body could not be made
         real(wp) :: moments(3) = 0.0_wp         !! principal moments, in the order of the principal axes
         integer :: order(3) = [1, 2, 3]         !! I(order(1)) <= I(order(2)) <= I(order(3))
@@ -23,72 +32,112 @@ module frb_inertia
         real(wp) :: alpha = 0.0_wp              !! a(2) - a(3) >= 0, from the difference of the moments
         real(wp) :: beta = 0.0_wp               !! a(1) - a(3) >= 0
         real(wp) :: gamma = 0.0_wp              !! a(1) - a(2) >= 0
-        logical :: turned = .false.             !! body axes are not the principal axes
-        real(wp) :: axes(3, 3) = 0.0_wp         !! columns: principal axes in body axes; used when `turned`
-        real(wp) :: axes_q(4) = 0.0_wp          !! the same rotation as a quaternion, principal to body
-    end type rigid_body
+        logical :: linear = .false.             !! a linear rotor
+        logical :: needs_rotation = .false.     !! body axes are not principal, or the rotor is linear
+        real(wp) :: axes(3, 3) = identity       !! columns: principal axes in body axes
+        real(wp) :: axes_q(4) = no_turn         !! the same rotation as a quaternion, principal to body
+        real(wp) :: axis(3) = 0.0_wp            !! of a linear rotor: axis of the zero moment, in body axes
+    end type body_core
 
-    interface rigid_body
-        module procedure body_from_moments
-        module procedure body_from_tensor
-    end interface rigid_body
+    !> Moments that differ by less than this part of the largest are equal, smaller ones are 0: the rounding
+    !> of R diag(I) R^T and of its eigenvalues.
+    real(wp), parameter :: rank_tolerance = 16*epsilon(1.0_wp)
+    !> Largest part of the momentum of a linear rotor that may lie along its axis: rounding, also where a kick
+    !> has cancelled most of the momentum.
+    real(wp), parameter :: axis_tolerance = 1.0e-8_wp
 
 contains
 
-    !> The body with the given principal moments, in any order and any consistent units.
-    !> `status` is `status_bad_moments` unless all three are finite, positive and not denormal.
-    pure function body_from_moments(moments) result(body)
-        real(wp), intent(in) :: moments(3)  !! I1, I2, I3 > 0
-        type(rigid_body) :: body
+    !> The core of a body with the given principal moments: see `rigid_body`. `status` is
+    !> `status_bad_moments` unless all three are finite, positive and not denormal, or one is 0 and the other
+    !> two are equal to rounding.
+    pure function core_from_moments(moments) result(core)
+        real(wp), intent(in) :: moments(3)
+        type(body_core) :: core
         real(wp) :: sorted(3)
 
         ! Finite first: comparing a NaN would raise a floating-point exception.
         if (.not. all(ieee_is_finite(moments))) return
-        if (.not. all(moments >= tiny(1.0_wp))) return
-        body%status = status_ok
-        body%moments = moments
-        call sorting_order(moments, body%order, body%parity)
-        sorted = moments(body%order)
-        body%a = 1/sorted
-        ! From the differences of the moments: exact to the last digits for nearly symmetric bodies.
-        body%alpha = ((sorted(3) - sorted(2))/sorted(3))/sorted(2)
-        body%beta = ((sorted(3) - sorted(1))/sorted(3))/sorted(1)
-        body%gamma = ((sorted(2) - sorted(1))/sorted(2))/sorted(1)
-    end function body_from_moments
+        if (any(moments < 0.0_wp)) return
+        call sorting_order(moments, core%order, core%parity)
+        sorted = moments(core%order)
+        if (sorted(2) < tiny(1.0_wp)) return
+        if (sorted(1) <= 0.0_wp) then
+            if (sorted(3) - sorted(2) > rank_tolerance*sorted(3)) return
+            core%linear = .true.
+            core%needs_rotation = .true.
+            core%axis(core%order(1)) = 1.0_wp
+            core%a = 1/sorted(3)
+        else
+            if (sorted(1) < tiny(1.0_wp)) return
+            core%a = 1/sorted
+            ! From the differences of the moments: exact to the last digits for nearly symmetric bodies.
+            core%alpha = ((sorted(3) - sorted(2))/sorted(3))/sorted(2)
+            core%beta = ((sorted(3) - sorted(1))/sorted(3))/sorted(1)
+            core%gamma = ((sorted(2) - sorted(1))/sorted(2))/sorted(1)
+        end if
+        core%status = status_ok
+        core%moments = moments
+    end function core_from_moments
 
-    !> The body with the given inertia tensor about its fixed point; momentum and attitude stay in the axes
-    !> the tensor is given in. `status` is `status_bad_tensor` unless the tensor is finite, symmetric to
-    !> rounding and positive definite.
-    function body_from_tensor(tensor) result(body)
+    !> The core of a body with the given inertia tensor: see `rigid_body`. `status` is that of
+    !> `principal_axes`.
+    function core_from_tensor(tensor) result(core)
         real(wp), intent(in) :: tensor(3, 3)
-        type(rigid_body) :: body
+        type(body_core) :: core
         real(wp) :: moments(3), axes(3, 3)
         integer :: stat
 
         call principal_axes(tensor, moments, axes, stat)
         if (stat /= status_ok) then
-            body%status = stat
+            core%status = stat
             return
         end if
-        body = body_from_moments(moments)
-        body%axes = axes
-        body%axes_q = matrix_to_quat(axes)
-        body%turned = body%axes_q(1) < 1.0_wp
-    end function body_from_tensor
+        core = core_from_moments(moments)
+        core%axes = axes
+        core%axes_q = matrix_to_quat(axes)
+        if (core%linear) core%axis = matmul(axes, core%axis)
+        ! Any element off the diagonal counts: the cosine of an angle below 1e-8 rounds to 1.
+        core%needs_rotation = core%linear .or. any(abs(axes - identity) > 0.0_wp)
+    end function core_from_tensor
+
+    !> Takes what a linear rotor's momentum has along the axis out of m, where it is more than rounding.
+    !> `code` is `status_bad_momentum`, and m as it was, if that is more than 1e-8 of the momentum.
+    pure subroutine keep_off_axis(core, m, code)
+        type(body_core), intent(in) :: core
+        real(wp), intent(inout) :: m(3)         !! angular momentum, body axes; finite
+        integer, intent(out) :: code
+        real(wp) :: along, largest
+
+        code = status_ok
+        if (.not. core%linear) return
+        ! A quarter of each, as the sum of three components may overflow.
+        largest = maxval(0.25_wp*abs(m))
+        along = sum(core%axis*(0.25_wp*m))
+        if (abs(along) > axis_tolerance*largest) then
+            code = status_bad_momentum
+        else if (abs(along) > 2*epsilon(1.0_wp)*largest) then
+            m = m - (4*along)*core%axis
+        end if
+    end subroutine keep_off_axis
 
     !> Principal moments and axes of an inertia tensor: tensor = axes diag(moments) axes^T, by LAPACK's dsyev.
     !> `axes` is a rotation (determinant +1): its columns are the principal axes in the axes of the tensor,
     !> it takes principal components to those of the tensor's axes. `moments` ascend, except that a diagonal
     !> tensor comes back as it is, in its own order with `axes` the identity. Moments and axes are those of a
-    !> tensor within a few roundings of the largest moment of the given one.
+    !> tensor within a few roundings of the largest moment of the given one. A moment below 16 epsilon of the
+    !> largest is rounding: it comes back as 0, the other two as their mean, if they are equal to 16 epsilon.
     !>
     !> `frb_step` and `quat_step` then take m and Q in principal axes, and give them back so:
     !>
     !>     m = matmul(m, axes);   Q = matmul(Q, axes)                  ! to principal axes
     !>     m = matmul(axes, m);   Q = matmul(Q, transpose(axes))       ! and back
     !>
-    !> `stat`: `status_bad_tensor` unless finite, symmetric to 8 roundings of the largest entry and positive
-    !> definite; `status_lapack_failed` if dsyev does not converge. Moments are then 0, axes the identity.
+    !> Products of inertia have the sign of the tensor: tensor(1,2) = - integral of x y dm.
+    !>
+    !> `stat`: `status_bad_tensor` unless finite, symmetric to 8 roundings of the largest entry and either
+    !> positive definite or that of a linear rotor (one moment 0, two equal); `status_lapack_failed` if dsyev
+    !> does not converge. Moments are then 0, axes the identity.
     subroutine principal_axes(tensor, moments, axes, stat)
         real(wp), intent(in) :: tensor(3, 3)
         real(wp), intent(out) :: moments(3)
@@ -96,13 +145,10 @@ contains
         integer, intent(out), optional :: stat
         real(wp), parameter :: symmetry_tolerance = 8*epsilon(1.0_wp)
         real(wp) :: largest, scaled(3, 3), work(16)
-        integer :: code, info, i
+        integer :: code, info
 
         moments = 0.0_wp
-        axes = 0.0_wp
-        do i = 1, 3
-            axes(i, i) = 1.0_wp
-        end do
+        axes = identity
         code = status_bad_tensor
         if (all(ieee_is_finite(tensor))) then
             largest = maxval(abs(tensor))
@@ -120,17 +166,38 @@ contains
                 axes(:, 3) = cross(axes(:, 1), axes(:, 2))
                 if (info /= 0) code = status_lapack_failed
             end if
-            if (code == status_ok .and. .not. all(moments >= tiny(1.0_wp))) code = status_bad_tensor
+            if (code == status_ok) call settle_rank(moments, code)
             if (code /= status_ok) then
                 moments = 0.0_wp
-                axes = 0.0_wp
-                do i = 1, 3
-                    axes(i, i) = 1.0_wp
-                end do
+                axes = identity
             end if
         end if
         call conclude(code, 'principal_axes', stat)
     end subroutine principal_axes
+
+    !> Moments of which one is rounding beside the largest become those of a linear rotor, or are refused;
+    !> the rank of a tensor does not depend on its axes.
+    pure subroutine settle_rank(moments, code)
+        real(wp), intent(inout) :: moments(3)
+        integer, intent(inout) :: code
+        real(wp) :: largest, parity
+        integer :: order(3)
+
+        call sorting_order(moments, order, parity)
+        associate (low => moments(order(1)), middle => moments(order(2)), high => moments(order(3)))
+            largest = high
+            if (low > rank_tolerance*largest) then
+                if (low < tiny(1.0_wp)) code = status_bad_tensor
+            else if (low < -rank_tolerance*largest .or. high - middle > rank_tolerance*largest &
+                     .or. high < tiny(1.0_wp)) then
+                code = status_bad_tensor
+            else
+                middle = middle + 0.5_wp*(high - middle)
+                high = middle
+                low = 0.0_wp
+            end if
+        end associate
+    end subroutine settle_rank
 
     !> Indices that sort three numbers in ascending order, and the sign of that permutation.
     pure subroutine sorting_order(values, order, parity)

@@ -2,7 +2,7 @@
 !> doublings, many periods by the arithmetic-geometric mean.
 module frb_flow_long
     use frb_flow_limits, only: middle_limit, square_limit, period_limit, smallest_denominator, sin_cos_limit
-    use frb_inertia, only: rigid_body
+    use frb_inertia, only: body_core
     use frb_kinds, only: wp, pi
     implicit none
     private
@@ -12,8 +12,8 @@ module frb_flow_long
 contains
 
     !> Advances m, and q when present, by 2 t, a time that the series do not reach.
-    subroutine long_step(body, t, m, q)
-        type(rigid_body), intent(in) :: body
+    pure subroutine long_step(body, t, m, q)
+        type(body_core), intent(in) :: body
         real(wp), intent(in) :: t           !! h/2
         real(wp), intent(inout) :: m(3)
         real(wp), intent(inout), optional :: q(4)

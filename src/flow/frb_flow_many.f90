@@ -4,7 +4,7 @@ module frb_flow_many
     use frb_flow_lanes, only: lanes, block_of_bodies
     use frb_flow_limits, only: plain_largest, plain_smallest
     use frb_flow_one, only: flow_body
-    use frb_inertia, only: rigid_body
+    use frb_inertia, only: body_core
     use frb_kinds, only: wp
     use frb_status, only: status_ok, status_bad_time
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
@@ -20,7 +20,7 @@ contains
     !> are independent: with -fopenmp they are shared among the threads.
     subroutine flow_many(body, bodies, h, n, m, code, q)
         integer, intent(in) :: bodies, n            !! bodies: 1 or n
-        type(rigid_body), intent(in) :: body(bodies)
+        type(body_core), intent(in) :: body(bodies)
         real(wp), intent(in) :: h
         real(wp), intent(inout) :: m(3, n)
         integer, intent(out) :: code
@@ -35,7 +35,7 @@ contains
         if (code /= status_ok) return
         refused = status_ok
         equal = .false.
-        if (bodies == 1) equal = .not. body(1)%turned .and. is_plain_time(body(1), h)
+        if (bodies == 1) equal = .not. body(1)%needs_rotation .and. is_plain_time(body(1), h)
         if (equal) call set_body(body(1), block)
         !$omp parallel do if (n >= 64*lanes) firstprivate(block) private(last, one, count, served) &
         !$omp& reduction(max: refused)
@@ -71,7 +71,7 @@ contains
 
     !> The same body into all lanes.
     pure subroutine set_body(body, bodies)
-        type(rigid_body), intent(in) :: body
+        type(body_core), intent(in) :: body
         type(block_of_bodies), intent(out) :: bodies
 
         bodies%alpha = body%alpha
@@ -86,7 +86,7 @@ contains
 
     !> Advances `lanes` equal bodies if all are plain; else, served = .false., they are left as they are.
     subroutine flow_whole(body, h, bodies, m, served, refused, q)
-        type(rigid_body), intent(in) :: body(1)             !! in its principal axes, plain in the time h
+        type(body_core), intent(in) :: body(1)             !! in its principal axes, plain in the time h
         real(wp), intent(in) :: h
         type(block_of_bodies), intent(inout) :: bodies      !! with the body in all lanes
         real(wp), intent(inout) :: m(3, lanes)
@@ -168,7 +168,7 @@ contains
     !> Bodies first to last into the lanes of a block, in sorted axes; lanes that hold no plain state rest.
     subroutine load_block(body, different, count, h, m, bodies, q)
         integer, intent(in) :: different, count     !! bodies that differ: 1 or count
-        type(rigid_body), intent(in) :: body(different)
+        type(body_core), intent(in) :: body(different)
         real(wp), intent(in) :: h
         real(wp), intent(in) :: m(3, count)
         type(block_of_bodies), intent(out) :: bodies
@@ -206,7 +206,7 @@ contains
 
     !> Whether angles that the body turns in the time h stay far from overflow.
     pure function is_plain_time(body, h) result(plain)
-        type(rigid_body), intent(in) :: body
+        type(body_core), intent(in) :: body
         real(wp), intent(in) :: h               !! finite
         logical :: plain
 
@@ -216,7 +216,7 @@ contains
 
     !> Whether one lane holds plain numbers of a body in its principal axes.
     pure function lane_is_plain(one, h, bodies, l, with_attitude) result(plain)
-        type(rigid_body), intent(in) :: one
+        type(body_core), intent(in) :: one
         real(wp), intent(in) :: h
         type(block_of_bodies), intent(in) :: bodies
         integer, intent(in) :: l
@@ -224,7 +224,7 @@ contains
         logical :: plain
         integer(int64) :: most
 
-        plain = one%status == status_ok .and. .not. one%turned
+        plain = one%status == status_ok .and. .not. one%needs_rotation
         if (.not. plain) return
         most = maxval(magnitude(bodies%m(l, :)))
         plain = are_plain(most, most) .and. is_plain_time(one, h)
@@ -237,7 +237,7 @@ contains
     !> Lanes back to bodies first to last; those the block did not serve go one by one.
     subroutine store_block(body, different, count, h, bodies, m, refused, q)
         integer, intent(in) :: different, count     !! bodies that differ: 1 or count
-        type(rigid_body), intent(in) :: body(different)
+        type(body_core), intent(in) :: body(different)
         real(wp), intent(in) :: h
         type(block_of_bodies), intent(in) :: bodies
         real(wp), intent(inout) :: m(3, count)

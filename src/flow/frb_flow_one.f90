@@ -8,7 +8,7 @@ module frb_flow_one
     use frb_flow_limits, only: short_limit, tiny_limit, tiny_turn_limit, small_turn_limit, middle_limit, &
         middle_turn_limit, plain_largest, plain_smallest
     use frb_flow_long, only: long_step
-    use frb_inertia, only: rigid_body
+    use frb_inertia, only: body_core, keep_off_axis
     use frb_kinds, only: wp
     use frb_status, only: status_ok, status_bad_momentum, status_bad_attitude, status_bad_time
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
@@ -16,7 +16,7 @@ module frb_flow_one
     implicit none
     private
 
-    public :: flow_body, flow_one, flow_turned
+    public :: flow_body, flow_one
 
     !> How far a step reaches: which series it takes.
     integer, parameter :: tiny_step = 1, short_step = 2, middle_step = 3
@@ -25,8 +25,8 @@ module frb_flow_one
 contains
 
     !> Advances m, and q when present, of any body by h; code says why the input was refused, if it was.
-    subroutine flow_body(body, h, m, code, q)
-        type(rigid_body), intent(in) :: body
+    pure subroutine flow_body(body, h, m, code, q)
+        type(body_core), intent(in) :: body
         real(wp), intent(in) :: h
         real(wp), intent(inout) :: m(3)
         integer, intent(out) :: code
@@ -34,8 +34,8 @@ contains
 
         code = body%status
         if (code /= status_ok) return
-        if (body%turned) then
-            call flow_turned(body, h, m, code, q)
+        if (body%needs_rotation) then
+            call flow_in_principal_axes(body, h, m, code, q)
         else
             call flow_one(body, h, m, code, q)
         end if
@@ -43,8 +43,8 @@ contains
 
     !> Advances m, and q when present, by h. `body` has status_ok and its own axes are principal.
     !> code: status_ok, or why the input was refused (it is then untouched).
-    recursive subroutine flow_one(body, h, m, code, q)
-        type(rigid_body), intent(in) :: body
+    pure recursive subroutine flow_one(body, h, m, code, q)
+        type(body_core), intent(in) :: body
         real(wp), intent(in) :: h
         real(wp), intent(inout) :: m(3)
         integer, intent(out) :: code
@@ -215,15 +215,16 @@ contains
                  - 0.5_wp*square
     end function tiny_norm
 
-    !> flow_one for a body whose own axes are not principal: the momentum is taken to principal axes, and only
+    !> flow_one for a body whose own axes are not principal, and for a linear rotor, whose constants are those
+    !> of a sphere and hold in any axes. Otherwise the momentum is taken to principal axes, and only
     !> the increments are taken back, so that no rounding of the rotation gathers over many steps.
-    subroutine flow_turned(body, h, m, code, q)
-        type(rigid_body), intent(in) :: body
+    pure subroutine flow_in_principal_axes(body, h, m, code, q)
+        type(body_core), intent(in) :: body
         real(wp), intent(in) :: h
         real(wp), intent(inout) :: m(3)
         integer, intent(out) :: code
         real(wp), intent(inout), optional :: q(4)
-        real(wp) :: n(3), old(3), change(4), w(3), w0, size_q
+        real(wp) :: n(3), old(3), upright(3), change(4), w(3), w0, size_q
 
         code = status_bad_momentum
         if (.not. all(ieee_is_finite(m))) return
@@ -232,6 +233,18 @@ contains
             size_q = sum(0.25_wp*abs(q))
             if (.not. ieee_is_finite(size_q)) return
             if (size_q <= 0.0_wp) return
+        end if
+        if (body%linear) then
+            upright = m
+            call keep_off_axis(body, upright, code)
+            if (code /= status_ok) return
+            if (present(q)) then
+                call flow_one(body, h, upright, code, q)
+            else
+                call flow_one(body, h, upright, code)
+            end if
+            if (code == status_ok) m = upright
+            return
         end if
         old = matmul(m, body%axes)
         n = old
@@ -251,18 +264,18 @@ contains
                  q(1)*w(1) + q(2)*w0 + (q(3)*w(3) - q(4)*w(2)), &
                  q(1)*w(2) + q(3)*w0 + (q(4)*w(1) - q(2)*w(3)), &
                  q(1)*w(3) + q(4)*w0 + (q(2)*w(2) - q(3)*w(1))]
-    end subroutine flow_turned
+    end subroutine flow_in_principal_axes
 
     !> The same flow with momentum, moments and time scaled by powers of 2 to the middle of the exponents; a
     !> time so long that no digit of any phase is left is cut to where the arithmetic holds.
-    subroutine flow_rescaled(body, h, m, code, q)
-        type(rigid_body), intent(in) :: body
+    pure recursive subroutine flow_rescaled(body, h, m, code, q)
+        type(body_core), intent(in) :: body
         real(wp), intent(in) :: h
         real(wp), intent(inout) :: m(3)
         integer, intent(out) :: code
         real(wp), intent(inout), optional :: q(4)
         integer, parameter :: cut = 64     ! angles of 2^64 and more have no phase
-        type(rigid_body) :: scaled
+        type(body_core) :: scaled
         real(wp) :: largest, time
         integer :: em, ea, eh, eq
 

@@ -5,8 +5,8 @@
 !> the start, turned n times; the error of the phase grows with the rounding of T and of the angle alone.
 module frb_free_motion
     use frb_flow_periods, only: quarter_period
-    use frb_free_flow, only: free_flow
-    use frb_inertia, only: rigid_body
+    use frb_free_flow, only: core_of, free_flow, rigid_body
+    use frb_inertia, only: body_core, keep_off_axis
     use frb_kinds, only: wp, two_pi
     use frb_rotations, only: norm3, quat_product, quat_rotate
     use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_count, status_bad_momentum, &
@@ -66,7 +66,7 @@ contains
         real(wp) :: largest
 
         motion%body = body
-        motion%status = body%status
+        motion%status = body%status()
         if (motion%status /= status_ok) return
         if (.not. all(ieee_is_finite(m))) then
             motion%status = status_bad_momentum
@@ -77,6 +77,8 @@ contains
         end if
         if (motion%status /= status_ok) return
         motion%m0 = m
+        call keep_off_axis(core_of(body), motion%m0, motion%status)
+        if (motion%status /= status_ok) return
         motion%q0 = q
         largest = maxval(abs(m))
         if (largest <= 0.0_wp) return
@@ -117,9 +119,9 @@ contains
         real(wp) :: n(3), alpha, beta, gamma, alpha_t, gamma_t, gg, p, r
         integer :: em, ea
 
-        associate (body => motion%body)
+        associate (body => core_of(motion%body))
             n = motion%m0
-            if (body%turned) n = matmul(n, body%axes)
+            if (body%needs_rotation) n = matmul(n, body%axes)
             em = exponent(maxval(abs(n)))
             ea = exponent(body%a(1))
             n = scale(n(body%order), -em)
@@ -263,7 +265,7 @@ contains
 
         path = orbit_of(motion)
         angle = 2*motion%half_angle
-        if (lesser_moments_are_equal(motion%body)) then
+        if (lesser_moments_are_equal(core_of(motion%body))) then
             if (.not. path%first_form) angle = angle + two_pi
         else if (path%first_form) then
             if (path%nu_mirror > few_halvings*path%larger) then
@@ -277,13 +279,13 @@ contains
 
     !> Equal as they were given, or within the rounding of a tensor's moments, some units of the largest one.
     pure function lesser_moments_are_equal(body) result(equal)
-        type(rigid_body), intent(in) :: body
+        type(body_core), intent(in) :: body
         logical :: equal
         real(wp), parameter :: rounding_of_tensors = 8*epsilon(1.0_wp)
         real(wp) :: moments(3)
 
         moments = body%moments(body%order)
-        equal = moments(2) - moments(1) <= merge(rounding_of_tensors*moments(3), 0.0_wp, body%turned)
+        equal = moments(2) - moments(1) <= merge(rounding_of_tensors*moments(3), 0.0_wp, body%needs_rotation)
     end function lesser_moments_are_equal
 
     !> Norm of a quaternion scaled to the middle of the exponents.

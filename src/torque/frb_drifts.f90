@@ -1,8 +1,8 @@
 !> Drifts by name, to be compared in the same loop: the free flow and the paper's two steps, exact or
 !> semi-exact.
 module frb_drifts
-    use frb_free_flow, only: free_flow
-    use frb_inertia, only: rigid_body
+    use frb_free_flow, only: core_of, free_flow, rigid_body
+    use frb_inertia, only: body_core
     use frb_kinds, only: wp
     use frb_matrix_step, only: frb_step
     use frb_quat_step, only: quat_step
@@ -99,13 +99,13 @@ contains
                                                          0.0_wp, 0.0_wp, 1.0_wp], [3, 3])
         real(wp) :: turn(3, 3), m_new(3)
 
-        call to_principal(body, m, q)
+        call to_principal(core_of(body), m, q)
         m_new = m
         turn = identity
-        call frb_step(m_new, turn, h, body%moments, m, identity, self%points, stat)
+        call frb_step(m_new, turn, h, body%moments(), m, identity, self%points, stat)
         m = m_new
         q = quat_product(q, matrix_to_quat(turn))
-        call from_principal(body, m, q)
+        call from_principal(core_of(body), m, q)
     end subroutine advance_by_matrix
 
     subroutine advance_by_quaternion(self, body, h, m, q, stat)
@@ -115,27 +115,27 @@ contains
         real(wp), intent(inout) :: m(3), q(4)
         integer, intent(out) :: stat
 
-        call to_principal(body, m, q)
-        call quat_step(m, q, h, body%moments, m, q, self%points, self%frame, stat)
-        call from_principal(body, m, q)
+        call to_principal(core_of(body), m, q)
+        call quat_step(m, q, h, body%moments(), m, q, self%points, self%frame, stat)
+        call from_principal(core_of(body), m, q)
     end subroutine advance_by_quaternion
 
     !> From the axes of a tensor to principal axes.
     pure subroutine to_principal(body, m, q)
-        type(rigid_body), intent(in) :: body
+        type(body_core), intent(in) :: body
         real(wp), intent(inout) :: m(3), q(4)
 
-        if (.not. body%turned) return
+        if (.not. body%needs_rotation) return
         m = quat_rotate(quat_conjugate(body%axes_q), m)
         q = quat_product(q, body%axes_q)
     end subroutine to_principal
 
     !> And back.
     pure subroutine from_principal(body, m, q)
-        type(rigid_body), intent(in) :: body
+        type(body_core), intent(in) :: body
         real(wp), intent(inout) :: m(3), q(4)
 
-        if (.not. body%turned) return
+        if (.not. body%needs_rotation) return
         m = quat_rotate(body%axes_q, m)
         q = quat_product(q, quat_conjugate(body%axes_q))
     end subroutine from_principal

@@ -4,7 +4,7 @@
 !> numbers of its kind share and has 26 bits at most. Products of such parts and sums of these fit in 53 bits,
 !> whether or not the compiler joins them to multiply-adds; all that is rounded is smaller by 2^-24.
 module frb_exact_updates
-    use frb_inertia, only: rigid_body
+    use frb_inertia, only: body_core
     use frb_kinds, only: wp
     implicit none
     private
@@ -50,7 +50,7 @@ contains
     !> E(r)^T m, as m is constant in space. The increments are as accurate as r - 1, whose scalar part follows
     !> from the norm; |m| and the energy are kept far better: see keep_norm_and_energy.
     pure subroutine turn_state(body, r, m, m_rest, q, q_rest)
-        type(rigid_body), intent(in) :: body
+        type(body_core), intent(in) :: body
         real(wp), intent(in) :: r(4)
         real(wp), intent(inout) :: m(3), m_rest(3), q(4), q_rest(4)
         real(wp) :: w, rr, c1, c2, c3, q0, q1, q2, q3, m1, m2, m3, cut
@@ -123,7 +123,7 @@ contains
     !> The motion magnifies these two errors in proportion to the time, and under a weak torque no others.
     !> In sorted axes 2 T is beta m1^2 + alpha m2^2 but for what |m| gives.
     pure subroutine keep_norm_and_energy(body, rr, high, low, m, m_rest, q, q_rest)
-        type(rigid_body), intent(in) :: body
+        type(body_core), intent(in) :: body
         real(wp), intent(in) :: rr, high(3), low(3), m(3), q(4)
         real(wp), intent(inout) :: m_rest(3), q_rest(4)
         real(wp), parameter :: limit = (32*epsilon(1.0_wp))**2
@@ -136,7 +136,7 @@ contains
         m_rest(1) = m_rest(1) + stretch*m(1)
         m_rest(2) = m_rest(2) + stretch*m(2)
         m_rest(3) = m_rest(3) + stretch*m(3)
-        if (body%turned .or. body%beta < 1.0e-20_wp .or. body%beta > 1.0e20_wp) return
+        if (body%needs_rotation .or. body%beta < 1.0e-20_wp .or. body%beta > 1.0e20_wp) return
 
         i1 = body%order(1)
         i2 = body%order(2)

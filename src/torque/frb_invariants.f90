@@ -1,6 +1,6 @@
 !> What a run ought to keep: energy, momentum in space, norms; and an observer that watches them.
 module frb_invariants
-    use frb_inertia, only: rigid_body
+    use frb_free_flow, only: core_of, rigid_body
     use frb_kinds, only: wp
     use frb_rotations, only: quat_rotate
     use frb_torque, only: body_scene, group_scene, body_observer
@@ -67,9 +67,11 @@ contains
         real(wp) :: energy
         real(wp) :: along(3)
 
-        along = m
-        if (body%turned) along = matmul(m, body%axes)
-        energy = 0.5_wp*sum(body%a*along(body%order)**2)
+        associate (core => core_of(body))
+            along = m
+            if (core%needs_rotation) along = matmul(m, core%axes)
+            energy = 0.5_wp*sum(core%a*along(core%order)**2)
+        end associate
     end function kinetic_energy_of_body
 
     !> T of n bodies that are alike.

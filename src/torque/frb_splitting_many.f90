@@ -1,8 +1,7 @@
 !> The run of n bodies that interact: see frb_splitting.
 module frb_splitting_many
     use frb_exact_updates, only: turn_state, kick_state
-    use frb_free_flow, only: free_flow
-    use frb_inertia, only: rigid_body
+    use frb_free_flow, only: core_of, free_flow, rigid_body
     use frb_kinds, only: wp
     use frb_schemes, only: splitting_scheme
     use frb_splitting_plan, only: timetable, new_timetable, check_run, is_attitude
@@ -68,7 +67,7 @@ contains
 
         body_status = status_ok
         do i = 1, size(body)
-            if (body_status == status_ok) body_status = body(i)%status
+            if (body_status == status_ok) body_status = body(i)%status()
         end do
         call check_run(body_status, scheme, h, nsteps, spacing, start, code, every, t)
         if (code == status_ok) code = check_group(size(body), m, q)
@@ -193,8 +192,8 @@ contains
             call advance_all(body, h, now%m_new, now%turn, code, drift)
             if (code /= status_ok) return
             do i = 1, size(now%m, 2)
-                call turn_state(body(min(i, size(body))), now%turn(:, i), now%m(:, i), now%m_rest(:, i), &
-                                now%q(:, i), now%q_rest(:, i))
+                call turn_state(core_of(body(min(i, size(body)))), now%turn(:, i), now%m(:, i), &
+                                now%m_rest(:, i), now%q(:, i), now%q_rest(:, i))
             end do
         end if
     end subroutine do_drift

@@ -1,8 +1,7 @@
 !> The run of one body: see frb_splitting.
 module frb_splitting_one
     use frb_exact_updates, only: turn_state, kick_state
-    use frb_free_flow, only: free_flow
-    use frb_inertia, only: rigid_body
+    use frb_free_flow, only: core_of, free_flow, rigid_body
     use frb_kinds, only: wp
     use frb_schemes, only: splitting_scheme
     use frb_splitting_plan, only: timetable, new_timetable, check_run, is_attitude
@@ -45,7 +44,7 @@ contains
         real(wp) :: tau(3), start
         integer :: code, spacing, step
 
-        call check_run(body%status, scheme, h, nsteps, spacing, start, code, every, t)
+        call check_run(body%status(), scheme, h, nsteps, spacing, start, code, every, t)
         if (code == status_ok .and. .not. all(ieee_is_finite(m))) code = status_bad_momentum
         if (code == status_ok) then
             if (.not. is_attitude(q)) code = status_bad_attitude
@@ -156,7 +155,7 @@ contains
             else
                 call free_flow(body, h, m, turn, code)
             end if
-            if (code == status_ok) call turn_state(body, turn, now%m, now%m_rest, now%q, now%q_rest)
+            if (code == status_ok) call turn_state(core_of(body), turn, now%m, now%m_rest, now%q, now%q_rest)
         end if
     end subroutine do_drift
 

@@ -5,7 +5,7 @@
 !> Torque and momentum are in the body frame: m' = m x I^-1 m + tau(q, t), q' = q (0, I^-1 m)/2. A torque from
 !> a potential V(q) is tau = sum over body vectors u = Q^T u0 that V depends on of u x dV/du.
 module frb_torque
-    use frb_inertia, only: rigid_body
+    use frb_free_flow, only: rigid_body
     use frb_kinds, only: wp
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
     implicit none
