@@ -11,6 +11,7 @@ module frb_inertia
     use frb_status, only: conclude, status_ok, status_bad_moments, status_bad_momentum, status_bad_tensor, &
         status_lapack_failed
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+    use, intrinsic :: iso_c_binding, only: c_bool, c_double, c_int
     implicit none
     private
 
@@ -22,21 +23,21 @@ module frb_inertia
     real(wp), parameter :: no_turn(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
 
     !> What `type(rigid_body)` holds. A core that could not be made has `status /= status_ok`, and every
-    !> routine that takes a body refuses it with that code.
-    type :: body_core
-        integer :: status = status_bad_moments  !! `status_ok`, or why the body could not be made
-        real(wp) :: moments(3) = 0.0_wp         !! principal moments, in the order of the principal axes
-        integer :: order(3) = [1, 2, 3]         !! I(order(1)) <= I(order(2)) <= I(order(3))
-        real(wp) :: parity = 1.0_wp             !! -1 when `order` is an odd permutation, else +1
-        real(wp) :: a(3) = 0.0_wp               !! 1/I, sorted: a(1) >= a(2) >= a(3)
-        real(wp) :: alpha = 0.0_wp              !! a(2) - a(3) >= 0, from the difference of the moments
-        real(wp) :: beta = 0.0_wp               !! a(1) - a(3) >= 0
-        real(wp) :: gamma = 0.0_wp              !! a(1) - a(2) >= 0
-        logical :: linear = .false.             !! a linear rotor
-        logical :: needs_rotation = .false.     !! body axes are not principal, or the rotor is linear
-        real(wp) :: axes(3, 3) = identity       !! columns: principal axes in body axes
-        real(wp) :: axes_q(4) = no_turn         !! the same rotation as a quaternion, principal to body
-        real(wp) :: axis(3) = 0.0_wp            !! of a linear rotor: axis of the zero moment, in body axes
+    !> routine that takes a body refuses it with that code. Interoperable, so that C can hold arrays of them.
+    type, bind(c) :: body_core
+        integer(c_int) :: status = status_bad_moments !! `status_ok`, or why the body could not be made
+        real(c_double) :: moments(3) = 0.0_wp         !! principal moments, in the order of the axes
+        integer(c_int) :: order(3) = [1, 2, 3]        !! I(order(1)) <= I(order(2)) <= I(order(3))
+        real(c_double) :: parity = 1.0_wp             !! -1 when `order` is an odd permutation, else +1
+        real(c_double) :: a(3) = 0.0_wp               !! 1/I, sorted: a(1) >= a(2) >= a(3)
+        real(c_double) :: alpha = 0.0_wp              !! a(2) - a(3) >= 0, from the differences
+        real(c_double) :: beta = 0.0_wp               !! a(1) - a(3) >= 0
+        real(c_double) :: gamma = 0.0_wp              !! a(1) - a(2) >= 0
+        logical(c_bool) :: linear = .false.           !! a linear rotor
+        logical(c_bool) :: needs_rotation = .false.   !! body axes are not principal, or the rotor is linear
+        real(c_double) :: axes(3, 3) = identity       !! columns: principal axes in body axes
+        real(c_double) :: axes_q(4) = no_turn         !! the same rotation as a quaternion, principal to body
+        real(c_double) :: axis(3) = 0.0_wp            !! of the zero moment of a linear rotor, in body axes
     end type body_core
 
     !> Moments that differ by less than this part of the largest are equal, smaller ones are 0: the rounding
