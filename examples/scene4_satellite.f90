@@ -2,7 +2,7 @@
 !> V = 3/2 u . I u with u = Q^T e, e the direction to the centre of the Earth, which turns once per orbit; the
 !> torque is 3 u x I u. Nothing else acts: no drag, no flexing, a spherical Earth.
 module frb_satellite
-    use frb, only: wp, body_scene, quat_conjugate, quat_rotate
+    use frb, only: wp, body_scene, quat_conjugate, quat_rotate, status_ok
     implicit none
     private
 
@@ -25,25 +25,29 @@ contains
         e = [-cos(t), -sin(t), 0.0_wp]
     end function to_earth
 
-    pure subroutine torque(self, q, t, tau)
-        class(gravity_gradient), intent(in) :: self
+    pure subroutine torque(self, q, t, tau, stat)
+        class(gravity_gradient), intent(inout) :: self
         real(wp), intent(in) :: q(4), t
         real(wp), intent(out) :: tau(3)
+        integer, intent(out) :: stat
         real(wp) :: u(3)
 
         u = quat_rotate(quat_conjugate(q), to_earth(t))
         tau = 3*[(self%moments(3) - self%moments(2))*u(2)*u(3), &
                  (self%moments(1) - self%moments(3))*u(3)*u(1), &
                  (self%moments(2) - self%moments(1))*u(1)*u(2)]
+        stat = status_ok
     end subroutine torque
 
-    pure function potential(self, q, t) result(v)
-        class(gravity_gradient), intent(in) :: self
+    pure subroutine potential(self, q, t, v, stat)
+        class(gravity_gradient), intent(inout) :: self
         real(wp), intent(in) :: q(4), t
-        real(wp) :: v
+        real(wp), intent(out) :: v
+        integer, intent(out) :: stat
 
         v = 1.5_wp*sum(self%moments*quat_rotate(quat_conjugate(q), to_earth(t))**2)
-    end function potential
+        stat = status_ok
+    end subroutine potential
 
 end module frb_satellite
 

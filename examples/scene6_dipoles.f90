@@ -2,7 +2,7 @@
 !> all the others: V = sum over pairs of (p_i . p_j - 3 (p_i . r)(p_j . r)/|r|^2)/|r|^3. No image charges, no
 !> damping. The torques cost N^2, the free flow N.
 module frb_dipole_lattice
-    use frb, only: wp, group_scene, quat_conjugate, quat_rotate
+    use frb, only: wp, group_scene, quat_conjugate, quat_rotate, status_ok
     implicit none
     private
 
@@ -41,11 +41,12 @@ contains
         end do
     end subroutine field
 
-    pure subroutine torques(self, q, t, tau)
-        class(dipole_lattice), intent(in) :: self
+    pure subroutine torques(self, q, t, tau, stat)
+        class(dipole_lattice), intent(inout) :: self
         real(wp), contiguous, intent(in) :: q(:, :)
         real(wp), intent(in) :: t
         real(wp), contiguous, intent(out) :: tau(:, :)
+        integer, intent(out) :: stat
         real(wp) :: p(3, size(q, 2)), e(3, size(q, 2))
         integer :: i
 
@@ -57,20 +58,23 @@ contains
                                     [p(2, i)*e(3, i) - p(3, i)*e(2, i), p(3, i)*e(1, i) - p(1, i)*e(3, i), &
                                      p(1, i)*e(2, i) - p(2, i)*e(1, i)])
         end do
+        stat = status_ok
     end subroutine torques
 
-    pure function potential(self, q, t) result(v)
-        class(dipole_lattice), intent(in) :: self
+    pure subroutine potential(self, q, t, v, stat)
+        class(dipole_lattice), intent(inout) :: self
         real(wp), contiguous, intent(in) :: q(:, :)
         real(wp), intent(in) :: t
-        real(wp) :: v
+        real(wp), intent(out) :: v
+        integer, intent(out) :: stat
         real(wp) :: p(3, size(q, 2)), e(3, size(q, 2))
 
         associate (unused_t => t)
         end associate
         call field(self, q, p, e)
         v = -0.5_wp*sum(p*e)
-    end function potential
+        stat = status_ok
+    end subroutine potential
 
 end module frb_dipole_lattice
 

@@ -4,9 +4,10 @@ module frb_torque_cases
     use frb_kinds, only: wp
     use frb_rotations, only: cross, quat_conjugate, quat_product, quat_rotate
     use frb_scenes, only: heavy_top
-    use frb_status, only: status_bad_option
+    use frb_status, only: status_ok, status_bad_option
     use frb_torque, only: body_scene, group_scene, body_observer, group_observer, body_drift
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
+    use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
@@ -27,7 +28,8 @@ module frb_torque_cases
     !> Keeps every state it is shown.
     type, extends(body_observer) :: recorder
         integer :: count = 0
-        integer, allocatable :: step(:)
+        integer(int64), allocatable :: step(:)
+        integer :: stop_at = -1             ! step at which it ends the run
         real(wp), allocatable :: t(:), m(:, :), q(:, :)
     contains
         procedure :: observe => record
@@ -36,7 +38,8 @@ module frb_torque_cases
     !> Counts what it is shown and keeps the last state.
     type, extends(group_observer) :: group_recorder
         integer :: count = 0
-        integer :: step = -1
+        integer(int64) :: step = -1
+        integer :: stop_at = -1             ! step at which it ends the run
         real(wp) :: t = -1.0_wp
         real(wp), allocatable :: m(:, :), q(:, :)
     contains
@@ -133,10 +136,11 @@ contains
         d = sqrt(sum((m - m_ref)**2) + min(sum((q - q_ref)**2), sum((q + q_ref)**2)))
     end function distance
 
-    subroutine record(self, step, t, m, q)
+    subroutine record(self, step, t, m, q, stop)
         class(recorder), intent(inout) :: self
-        integer, intent(in) :: step
+        integer(int64), intent(in) :: step
         real(wp), intent(in) :: t, m(3), q(4)
+        logical, intent(inout) :: stop
 
         if (.not. allocated(self%t)) then
             allocate (self%step(2000), self%t(2000), self%m(3, 2000), self%q(4, 2000))
@@ -146,40 +150,47 @@ contains
         self%t(self%count) = t
         self%m(:, self%count) = m
         self%q(:, self%count) = q
+        if (step == self%stop_at) stop = .true.
     end subroutine record
 
-    subroutine record_group(self, step, t, m, q)
+    subroutine record_group(self, step, t, m, q, stop)
         class(group_recorder), intent(inout) :: self
-        integer, intent(in) :: step
+        integer(int64), intent(in) :: step
         real(wp), intent(in) :: t
         real(wp), contiguous, intent(in) :: m(:, :), q(:, :)
+        logical, intent(inout) :: stop
 
         self%count = self%count + 1
         self%step = step
         self%t = t
         self%m = m
         self%q = q
+        if (step == self%stop_at) stop = .true.
     end subroutine record_group
 
-    pure subroutine pulsed(self, q, t, tau)
-        class(pulsed_torque), intent(in) :: self
+    pure subroutine pulsed(self, q, t, tau, stat)
+        class(pulsed_torque), intent(inout) :: self
         real(wp), intent(in) :: q(4), t
         real(wp), intent(out) :: tau(3)
+        integer, intent(out) :: stat
 
         associate (unused_self => self, unused_q => q)
         end associate
         tau = [0.0_wp, 0.0_wp, cos(t)]
+        stat = status_ok
     end subroutine pulsed
 
-    pure subroutine spoilt(self, q, t, tau)
-        class(spoilt_torque), intent(in) :: self
+    pure subroutine spoilt(self, q, t, tau, stat)
+        class(spoilt_torque), intent(inout) :: self
         real(wp), intent(in) :: q(4), t
         real(wp), intent(out) :: tau(3)
+        integer, intent(out) :: stat
 
         associate (unused_q => q)
         end associate
         tau = 0.0_wp
         if (t >= self%until) tau(2) = ieee_value(t, ieee_quiet_nan)
+        stat = status_ok
     end subroutine spoilt
 
     subroutine advance_plainly(self, body, h, m, q, stat)
@@ -225,11 +236,12 @@ contains
     end subroutine give_up
 
     !> tau_i = Q_i^T (p_i x E_i), E_i the field of the others at centre i; p = Q e3, centres (j, 0, 0).
-    pure subroutine dipole_torques(self, q, t, tau)
-        class(dipoles), intent(in) :: self
+    pure subroutine dipole_torques(self, q, t, tau, stat)
+        class(dipoles), intent(inout) :: self
         real(wp), contiguous, intent(in) :: q(:, :)
         real(wp), intent(in) :: t
         real(wp), contiguous, intent(out) :: tau(:, :)
+        integer, intent(out) :: stat
         real(wp) :: p(3, size(q, 2))
         integer :: i
 
@@ -238,14 +250,16 @@ contains
             tau(:, i) = quat_rotate(quat_conjugate(q(:, i)), cross(p(:, i), self%strength*field(p, i)))
         end do
         if (t >= self%spoilt_from) tau(3, :) = ieee_value(t, ieee_quiet_nan)
+        stat = status_ok
     end subroutine dipole_torques
 
     !> V = -1/2 sum of p_i . E_i.
-    pure function dipole_potential(self, q, t) result(v)
-        class(dipoles), intent(in) :: self
+    pure subroutine dipole_potential(self, q, t, v, stat)
+        class(dipoles), intent(inout) :: self
         real(wp), contiguous, intent(in) :: q(:, :)
         real(wp), intent(in) :: t
-        real(wp) :: v
+        real(wp), intent(out) :: v
+        integer, intent(out) :: stat
         real(wp) :: p(3, size(q, 2))
         integer :: i
 
@@ -256,7 +270,8 @@ contains
         do i = 1, size(q, 2)
             v = v - 0.5_wp*self%strength*dot_product(p(:, i), field(p, i))
         end do
-    end function dipole_potential
+        stat = status_ok
+    end subroutine dipole_potential
 
     pure function moments_in_space(q) result(p)
         real(wp), intent(in) :: q(:, :)
@@ -281,15 +296,17 @@ contains
         end do
     end function field
 
-    pure subroutine torques_of_tops(self, q, t, tau)
-        class(many_tops), intent(in) :: self
+    pure subroutine torques_of_tops(self, q, t, tau, stat)
+        class(many_tops), intent(inout) :: self
         real(wp), contiguous, intent(in) :: q(:, :)
         real(wp), intent(in) :: t
         real(wp), contiguous, intent(out) :: tau(:, :)
+        integer, intent(out) :: stat
         integer :: i
 
+        stat = status_ok
         do i = 1, size(q, 2)
-            call self%top%torque(q(:, i), t, tau(:, i))
+            if (stat == status_ok) call self%top%torque(q(:, i), t, tau(:, i), stat)
         end do
     end subroutine torques_of_tops
 

@@ -8,6 +8,7 @@ module frb_chart_top
     use frb_chart_timing, only: clock
     use frb_dmv, only: dmv_body, new_dmv_body, dmv_steps
     use frb_top_truth, only: qp, taylor_top
+    use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
@@ -316,13 +317,14 @@ contains
             observer=seen)
     end subroutine run_torus
 
-    subroutine observe_raster(self, step, t, m, q)
+    subroutine observe_raster(self, step, t, m, q, stop)
         class(raster), intent(inout) :: self
-        integer, intent(in) :: step
+        integer(int64), intent(in) :: step
         real(wp), intent(in) :: t, m(3), q(4)
+        logical, intent(inout) :: stop
         integer :: pixel(2)
 
-        associate (unused_step => step, unused_t => t, unused_q => q)
+        associate (unused_step => step, unused_t => t, unused_q => q, unused_stop => stop)
         end associate
         if (any(m(1:2) <= self%low) .or. any(m(1:2) >= self%high)) return
         pixel = 1 + int((m(1:2) - self%low)/(self%high - self%low)*shape(self%hits))

@@ -5,6 +5,7 @@ module frb_driver_top
     use frb_driver_watch, only: run_watch
     use frb_init_files, only: init_values
     use frb_out_files, only: out_file
+    use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
@@ -22,13 +23,16 @@ module frb_driver_top
 contains
 
     !> Notes and writes a state; what happens between two calls is the time of a step.
-    subroutine write_record(self, step, t, m, q)
+    subroutine write_record(self, step, t, m, q, stop)
         class(top_recorder), intent(inout) :: self
-        integer, intent(in) :: step
+        integer(int64), intent(in) :: step
         real(wp), intent(in) :: t, m(3), q(4)
+        logical, intent(inout) :: stop
         character(:), allocatable :: error
         real(wp) :: attitude(3, 3), time
 
+        associate (unused_stop => stop)
+        end associate
         if (step > 0) call self%watch%end_step()
         attitude = matmul(self%start%attitude, quat_to_matrix(q))
         call self%watch%note(m, attitude, self%start%moments)

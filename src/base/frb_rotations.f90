@@ -11,7 +11,7 @@ module frb_rotations
     private
 
     public :: cross, norm3, quat_product, quat_conjugate, quat_rotate, quat_to_matrix, matrix_to_quat, &
-        quat_along
+        quat_along, is_unit_quat
 
 contains
 
@@ -59,6 +59,18 @@ contains
 
         conjugate = [q(1), -q(2), -q(3), -q(4)]
     end function quat_conjugate
+
+    !> Whether q can stand for an attitude where that must have norm one: finite, | |q| - 1 | at most 1e-6.
+    !> Every routine of the library that needs a unit quaternion asks this and refuses others.
+    pure function is_unit_quat(q) result(good)
+        real(wp), intent(in) :: q(4)
+        logical :: good
+        real(wp), parameter :: tolerance = 1.0e-6_wp
+
+        good = all(ieee_is_finite(q))
+        if (good) good = maxval(abs(q)) < 2.0_wp
+        if (good) good = abs(sqrt(sum(q*q)) - 1) <= tolerance
+    end function is_unit_quat
 
     !> The vector E(q) v, from body to space for an attitude q of norm one, (10).
     pure function quat_rotate(q, v) result(w)

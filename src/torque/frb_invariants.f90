@@ -3,7 +3,10 @@ module frb_invariants
     use frb_free_flow, only: core_of, rigid_body
     use frb_kinds, only: wp
     use frb_rotations, only: quat_rotate
+    use frb_status, only: status_ok
     use frb_torque, only: body_scene, group_scene, body_observer
+    use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
+    use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
@@ -18,7 +21,7 @@ module frb_invariants
     end interface kinetic_energy
 
     !> T + V: total_energy(body, scene, t, m, q), of one body or of all. NaN when the scene gives no
-    !> potential. Constant in time when the potential does not depend on time.
+    !> potential or refuses. Constant in time when the potential does not depend on time.
     interface total_energy
         module procedure total_energy_of_body
         module procedure total_energy_alike
@@ -97,19 +100,22 @@ contains
     end function kinetic_energy_of_group
 
     !> T + V of one body.
-    pure function total_energy_of_body(body, scene, t, m, q) result(energy)
+    function total_energy_of_body(body, scene, t, m, q) result(energy)
         type(rigid_body), intent(in) :: body
-        class(body_scene), intent(in) :: scene
+        class(body_scene), intent(inout) :: scene
         real(wp), intent(in) :: t, m(3), q(4)
-        real(wp) :: energy
+        real(wp) :: energy, v
+        integer :: stat
 
-        energy = kinetic_energy_of_body(body, m) + scene%potential(q, t)
+        call scene%potential(q, t, v, stat)
+        energy = kinetic_energy_of_body(body, m) + v
+        if (stat /= status_ok) energy = ieee_value(v, ieee_quiet_nan)
     end function total_energy_of_body
 
     !> T + V of n bodies that are alike.
-    pure function total_energy_alike(body, scene, t, m, q) result(energy)
+    function total_energy_alike(body, scene, t, m, q) result(energy)
         type(rigid_body), intent(in) :: body
-        class(group_scene), intent(in) :: scene
+        class(group_scene), intent(inout) :: scene
         real(wp), intent(in) :: t
         real(wp), contiguous, intent(in) :: m(:, :), q(:, :)
         real(wp) :: energy
@@ -118,14 +124,17 @@ contains
     end function total_energy_alike
 
     !> T + V of n bodies.
-    pure function total_energy_of_group(body, scene, t, m, q) result(energy)
+    function total_energy_of_group(body, scene, t, m, q) result(energy)
         type(rigid_body), intent(in) :: body(:)
-        class(group_scene), intent(in) :: scene
+        class(group_scene), intent(inout) :: scene
         real(wp), intent(in) :: t
         real(wp), contiguous, intent(in) :: m(:, :), q(:, :)
-        real(wp) :: energy
+        real(wp) :: energy, v
+        integer :: stat
 
-        energy = kinetic_energy_of_group(body, m) + scene%potential(q, t)
+        call scene%potential(q, t, v, stat)
+        energy = kinetic_energy_of_group(body, m) + v
+        if (stat /= status_ok) energy = ieee_value(v, ieee_quiet_nan)
     end function total_energy_of_group
 
     !> Q m of one body.
@@ -149,15 +158,21 @@ contains
     end function spatial_momentum_of_group
 
     !> Takes the values at the start as those to be kept, and keeps the largest departures from them.
-    subroutine monitor_body(self, step, t, m, q)
+    subroutine monitor_body(self, step, t, m, q, stop)
         class(invariant_monitor), intent(inout) :: self
-        integer, intent(in) :: step
+        integer(int64), intent(in) :: step
         real(wp), intent(in) :: t, m(3), q(4)
+        logical, intent(inout) :: stop
         real(wp) :: energy, momentum
 
+        associate (unused_stop => stop)
+        end associate
         momentum = dot_product(self%axis, quat_rotate(q, m))
-        energy = kinetic_energy_of_body(self%body, m)
-        if (allocated(self%scene)) energy = energy + self%scene%potential(q, t)
+        if (allocated(self%scene)) then
+            energy = total_energy_of_body(self%body, self%scene, t, m, q)
+        else
+            energy = kinetic_energy_of_body(self%body, m)
+        end if
         if (step == 0) then
             self%energy = energy
             self%momentum = momentum

@@ -2,6 +2,7 @@
 module frb_scenes
     use frb_kinds, only: wp
     use frb_rotations, only: quat_rotate
+    use frb_status, only: status_ok, status_bad_torque
     use frb_torque, only: body_scene
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
     implicit none
@@ -30,7 +31,7 @@ module frb_scenes
 
     abstract interface
         !> The torque at attitude q and time t, in the body frame.
-        pure subroutine plain_torque(q, t, tau)
+        subroutine plain_torque(q, t, tau)
             import :: wp
             implicit none
             real(wp), intent(in) :: q(4)
@@ -39,7 +40,7 @@ module frb_scenes
         end subroutine plain_torque
 
         !> The potential energy at attitude q and time t.
-        pure function plain_potential(q, t) result(v)
+        function plain_potential(q, t) result(v)
             import :: wp
             implicit none
             real(wp), intent(in) :: q(4)
@@ -51,10 +52,11 @@ module frb_scenes
 contains
 
     !> u x centre with u = Q^T force; for the paper's top (u2, -u1, 0).
-    pure subroutine heavy_top_torque(self, q, t, tau)
-        class(heavy_top), intent(in) :: self
+    pure subroutine heavy_top_torque(self, q, t, tau, stat)
+        class(heavy_top), intent(inout) :: self
         real(wp), intent(in) :: q(4), t
         real(wp), intent(out) :: tau(3)
+        integer, intent(out) :: stat
 
         real(wp) :: f(3), u1, u2, u3, w1, w2, w3
 
@@ -72,43 +74,51 @@ contains
         tau(1) = u2*self%centre(3) - u3*self%centre(2)
         tau(2) = u3*self%centre(1) - u1*self%centre(3)
         tau(3) = u1*self%centre(2) - u2*self%centre(1)
+        stat = status_ok
     end subroutine heavy_top_torque
 
     !> V = force . Q centre.
-    pure function heavy_top_potential(self, q, t) result(v)
-        class(heavy_top), intent(in) :: self
+    pure subroutine heavy_top_potential(self, q, t, v, stat)
+        class(heavy_top), intent(inout) :: self
         real(wp), intent(in) :: q(4), t
-        real(wp) :: v
+        real(wp), intent(out) :: v
+        integer, intent(out) :: stat
 
         associate (unused_t => t)
         end associate
         v = dot_product(self%force, quat_rotate(q, self%centre))
-    end function heavy_top_potential
+        stat = status_ok
+    end subroutine heavy_top_potential
 
-    !> The user's torque; NaN, which `integrate` refuses, when there is none.
-    pure subroutine plain_scene_torque(self, q, t, tau)
-        class(plain_scene), intent(in) :: self
+    !> The user's torque; `status_bad_torque` when there is none.
+    subroutine plain_scene_torque(self, q, t, tau, stat)
+        class(plain_scene), intent(inout) :: self
         real(wp), intent(in) :: q(4), t
         real(wp), intent(out) :: tau(3)
+        integer, intent(out) :: stat
 
         if (associated(self%torque_of)) then
             call self%torque_of(q, t, tau)
+            stat = status_ok
         else
-            tau = ieee_value(tau, ieee_quiet_nan)
+            tau = 0.0_wp
+            stat = status_bad_torque
         end if
     end subroutine plain_scene_torque
 
     !> The user's potential; NaN when there is none.
-    pure function plain_scene_potential(self, q, t) result(v)
-        class(plain_scene), intent(in) :: self
+    subroutine plain_scene_potential(self, q, t, v, stat)
+        class(plain_scene), intent(inout) :: self
         real(wp), intent(in) :: q(4), t
-        real(wp) :: v
+        real(wp), intent(out) :: v
+        integer, intent(out) :: stat
 
         if (associated(self%potential_of)) then
             v = self%potential_of(q, t)
         else
             v = ieee_value(v, ieee_quiet_nan)
         end if
-    end function plain_scene_potential
+        stat = status_ok
+    end subroutine plain_scene_potential
 
 end module frb_scenes

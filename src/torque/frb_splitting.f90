@@ -1,27 +1,42 @@
 !> Bodies under torque: the free flow (drift) and the torque (kick) in turns, H = T + V.
 !>
 !> One step of an ABA scheme is drift(a1 h) kick(b1 h) drift(a2 h) ... drift(a1 h), section 4.3 and the
-!> appendix of the paper; time passes with the drift. The stage that closes a step and the one that opens the
-!> next are done as one. A state that is shown to an observer is completed on a copy, so watching a run does
-!> not change it, not even in the last digit.
+!> appendix of the paper; time passes with the drift. `splitting_plan` lays a step out, for `integrate` and
+!> for loops of the user's own.
 module frb_splitting
-    use frb_splitting_many, only: integrate_alike, integrate_group
+    use frb_free_flow, only: rigid_body
+    use frb_kinds, only: wp
+    use frb_schemes, only: splitting_scheme
+    use frb_splitting_many, only: integrate_group
     use frb_splitting_one, only: integrate_body
+    use frb_torque, only: body_scene, body_observer, body_drift, group_scene, group_observer
+    use, intrinsic :: iso_fortran_env, only: int32, int64
     implicit none
     private
 
     public :: integrate
 
     !> Integrates one body, or n bodies that interact, over `nsteps` steps of size `h`, in place:
-    !> `call integrate(body, scheme, scene, h, nsteps, m, q, observer, every, t, drift, compensated, stat)`.
+    !> `call integrate(body, scheme, scene, h, nsteps, m, q, observer, every, t, drift, compensated, rests,
+    !> stat)`.
     !>
     !> For n bodies m is (3, n), q is (4, n), the body a scalar or body(n), scene and observer those of a
-    !> group. q is handed to the torque as it is, so its norm must be one to the accuracy wanted; it is kept.
-    !> Refused with `stat`, the state and t untouched: a body or scheme that could not be made (their own
-    !> code); h zero, h or t not finite, or nsteps*h beyond 1e301 (`status_bad_time`); nsteps < 0, every < 1
-    !> or sizes that differ (`status_bad_count`); m not finite (`status_bad_momentum`); q not finite or of
-    !> norm zero (`status_bad_attitude`); a torque that is not finite, or so large that m overflows, at any
-    !> time of the run (`status_bad_torque`).
+    !> group. `nsteps` is an integer of 32 or 64 bits; steps are counted in 64. Refused with `stat`, the state
+    !> and t untouched: a body or scheme that could not be made (their own code); h zero, h or t not finite,
+    !> or nsteps*h beyond 1e301 (`status_bad_time`); nsteps < 0, every < 1 or sizes that differ
+    !> (`status_bad_count`); m not finite (`status_bad_momentum`); q not finite or its norm more than 1e-6 off
+    !> one (`status_bad_attitude`). q is handed to the torque as it is, so its norm should be one to the
+    !> accuracy wanted; it is kept. What ends a run later leaves m, q and t of the last whole step: the code
+    !> that a torque or drift returns; a torque that is not finite, or so large that m overflows
+    !> (`status_bad_torque`); an observer (`status_stopped`; without `stat` the call then returns, while every
+    !> other code stops the program). All of these are agreed upon first where many processes share a scene:
+    !> see `agree` in frb_torque.
+    !>
+    !> Exact restart: the state after a step depends on nothing but m, q, t and h before it. A run that is
+    !> stopped, by its observer or its number of steps, and continued from m, q and t as they came back, ends
+    !> with the same bits as one that is not; watching a run changes nothing either. A compensated run needs
+    !> `rests` as well: (7), or (7, n) for a group, what m (1:3) and q (4:7) lack; zero at the start, kept up
+    !> to date. For that, steps are whole: a scheme that opens and closes with a drift (ABA) makes both.
     !>
     !> `compensated` carries the rounding error of every update of m and q over to the next one, and keeps |m|
     !> and the energy in every drift. It takes twice the time and pays in long runs: there energy,
@@ -47,6 +62,95 @@ module frb_splitting
         procedure integrate_body
         procedure integrate_alike
         procedure integrate_group
+        procedure integrate_body_int32
+        procedure integrate_alike_int32
+        procedure integrate_group_int32
     end interface integrate
+
+contains
+
+    !> n bodies that are alike.
+    subroutine integrate_alike(body, scheme, scene, h, nsteps, m, q, observer, every, t, drift, &
+                      compensated, rests, stat)
+        type(rigid_body), intent(in) :: body
+        type(splitting_scheme), intent(in) :: scheme
+        class(group_scene), intent(inout) :: scene
+        real(wp), intent(in) :: h
+        integer(int64), intent(in) :: nsteps
+        real(wp), contiguous, intent(inout) :: m(:, :), q(:, :)
+        class(group_observer), intent(inout), optional :: observer
+        integer, intent(in), optional :: every
+        real(wp), intent(inout), optional :: t
+        class(body_drift), intent(in), optional :: drift
+        logical, intent(in), optional :: compensated
+        real(wp), contiguous, intent(inout), optional :: rests(:, :)
+        integer, intent(out), optional :: stat
+
+        call integrate_group([body], scheme, scene, h, nsteps, m, q, observer, every, t, drift, &
+                      compensated, rests, stat)
+    end subroutine integrate_alike
+
+    !> One body, steps counted by a shorter integer.
+    subroutine integrate_body_int32(body, scheme, scene, h, nsteps, m, q, observer, every, t, drift, &
+                      compensated, rests, stat)
+        type(rigid_body), intent(in) :: body
+        type(splitting_scheme), intent(in) :: scheme
+        class(body_scene), intent(inout) :: scene
+        real(wp), intent(in) :: h
+        integer(int32), intent(in) :: nsteps
+        real(wp), intent(inout) :: m(3), q(4)
+        class(body_observer), intent(inout), optional :: observer
+        integer, intent(in), optional :: every
+        real(wp), intent(inout), optional :: t
+        class(body_drift), intent(in), optional :: drift
+        logical, intent(in), optional :: compensated
+        real(wp), intent(inout), optional :: rests(7)
+        integer, intent(out), optional :: stat
+
+        call integrate_body(body, scheme, scene, h, int(nsteps, int64), m, q, observer, every, t, drift, &
+                      compensated, rests, stat)
+    end subroutine integrate_body_int32
+
+    !> n bodies that are alike, steps counted by a shorter integer.
+    subroutine integrate_alike_int32(body, scheme, scene, h, nsteps, m, q, observer, every, t, drift, &
+                      compensated, rests, stat)
+        type(rigid_body), intent(in) :: body
+        type(splitting_scheme), intent(in) :: scheme
+        class(group_scene), intent(inout) :: scene
+        real(wp), intent(in) :: h
+        integer(int32), intent(in) :: nsteps
+        real(wp), contiguous, intent(inout) :: m(:, :), q(:, :)
+        class(group_observer), intent(inout), optional :: observer
+        integer, intent(in), optional :: every
+        real(wp), intent(inout), optional :: t
+        class(body_drift), intent(in), optional :: drift
+        logical, intent(in), optional :: compensated
+        real(wp), contiguous, intent(inout), optional :: rests(:, :)
+        integer, intent(out), optional :: stat
+
+        call integrate_group([body], scheme, scene, h, int(nsteps, int64), m, q, observer, every, t, drift, &
+                      compensated, rests, stat)
+    end subroutine integrate_alike_int32
+
+    !> n bodies, steps counted by a shorter integer.
+    subroutine integrate_group_int32(body, scheme, scene, h, nsteps, m, q, observer, every, t, drift, &
+                      compensated, rests, stat)
+        type(rigid_body), intent(in) :: body(:)
+        type(splitting_scheme), intent(in) :: scheme
+        class(group_scene), intent(inout) :: scene
+        real(wp), intent(in) :: h
+        integer(int32), intent(in) :: nsteps
+        real(wp), contiguous, intent(inout) :: m(:, :), q(:, :)
+        class(group_observer), intent(inout), optional :: observer
+        integer, intent(in), optional :: every
+        real(wp), intent(inout), optional :: t
+        class(body_drift), intent(in), optional :: drift
+        logical, intent(in), optional :: compensated
+        real(wp), contiguous, intent(inout), optional :: rests(:, :)
+        integer, intent(out), optional :: stat
+
+        call integrate_group(body, scheme, scene, h, int(nsteps, int64), m, q, observer, every, t, drift, &
+                      compensated, rests, stat)
+    end subroutine integrate_group_int32
 
 end module frb_splitting

@@ -1,255 +1,260 @@
 !> The run of n bodies that interact: see frb_splitting.
 module frb_splitting_many
     use frb_exact_updates, only: turn_state, kick_state
-    use frb_free_flow, only: core_of, free_flow, rigid_body
+    use frb_flow_many, only: flow_many
+    use frb_free_flow, only: core_of, rigid_body
+    use frb_inertia, only: body_core
     use frb_kinds, only: wp
+    use frb_rotations, only: is_unit_quat
     use frb_schemes, only: splitting_scheme
-    use frb_splitting_plan, only: timetable, new_timetable, check_run, is_attitude
+    use frb_splitting_plan, only: splitting_plan, check_run
+    use frb_splitting_run, only: splitting_run, run_steps, largest_momentum
     use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_count, status_bad_momentum, &
-        status_bad_torque
+        status_bad_torque, status_stopped
     use frb_torque, only: group_scene, group_observer, body_drift
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+    use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
-    public :: integrate_alike, integrate_group
+    public :: integrate_group
 
-    !> Momenta (3, n) and attitudes (4, n); what they lack and room for the turns in a compensated run.
-    type :: group_state
-        real(wp), allocatable :: m(:, :), q(:, :)
+    !> Momenta (3, n) and attitudes (4, n), what they lack and room for the turns in a compensated run, and
+    !> all of it at the last whole step.
+    type, extends(splitting_run) :: group_run
+        real(wp), allocatable :: m(:, :), q(:, :), tau(:, :)
         real(wp), allocatable :: m_rest(:, :), q_rest(:, :), m_new(:, :), turn(:, :)
-    end type group_state
+        real(wp), allocatable :: kept_m(:, :), kept_q(:, :), kept_m_rest(:, :), kept_q_rest(:, :)
+        type(body_core), allocatable :: core(:)
+        type(rigid_body), pointer :: body(:) => null()          !! n, or one for all
+        class(group_scene), pointer :: scene => null()
+        class(group_observer), pointer :: observer => null()
+        class(body_drift), pointer :: drift => null()           !! null: the free flow, in a batch
+    contains
+        procedure :: stage => stage_of_group
+        procedure :: move => move_group
+        procedure :: keep => keep_group
+        procedure :: go_back => go_back_group
+        procedure :: show => show_group
+    end type group_run
 
 contains
 
-    !> n bodies that are alike.
-    subroutine integrate_alike(body, scheme, scene, h, nsteps, m, q, observer, every, t, drift, &
-                               compensated, stat)
-        type(rigid_body), intent(in) :: body
-        type(splitting_scheme), intent(in) :: scheme
-        class(group_scene), intent(in) :: scene                     !! the torques
-        real(wp), intent(in) :: h                                   !! step, of either sign, not zero
-        integer, intent(in) :: nsteps                               !! number of steps, >= 0
-        real(wp), contiguous, intent(inout) :: m(:, :)              !! angular momenta (3, n), body frames
-        real(wp), contiguous, intent(inout) :: q(:, :)              !! attitudes (4, n), unit quaternions
-        class(group_observer), intent(inout), optional :: observer  !! at the start and every `every` steps
-        integer, intent(in), optional :: every                      !! >= 1, default 1
-        real(wp), intent(inout), optional :: t                      !! time, goes on by nsteps*h; from 0
-        class(body_drift), intent(in), optional :: drift            !! default: the free flow
-        logical, intent(in), optional :: compensated                !! default: .false.
-        integer, intent(out), optional :: stat                      !! status code
-
-        call integrate_group([body], scheme, scene, h, nsteps, m, q, observer, every, t, drift, &
-                             compensated, stat)
-    end subroutine integrate_alike
-
     !> n bodies, each with moments of its own.
     subroutine integrate_group(body, scheme, scene, h, nsteps, m, q, observer, every, t, drift, &
-                               compensated, stat)
-        type(rigid_body), intent(in) :: body(:)                     !! n bodies, or one for all
+                               compensated, rests, stat)
+        type(rigid_body), intent(in), target :: body(:)             !! n bodies, or one for all
         type(splitting_scheme), intent(in) :: scheme
-        class(group_scene), intent(in) :: scene                     !! the torques
+        class(group_scene), intent(inout), target :: scene          !! the torques
         real(wp), intent(in) :: h                                   !! step, of either sign, not zero
-        integer, intent(in) :: nsteps                               !! number of steps, >= 0
+        integer(int64), intent(in) :: nsteps                        !! number of steps, >= 0
         real(wp), contiguous, intent(inout) :: m(:, :)              !! angular momenta (3, n), body frames
         real(wp), contiguous, intent(inout) :: q(:, :)              !! attitudes (4, n), unit quaternions
-        class(group_observer), intent(inout), optional :: observer  !! at the start and every `every` steps
+        class(group_observer), intent(inout), optional, target :: observer  !! at start, every `every` steps
         integer, intent(in), optional :: every                      !! >= 1, default 1
         real(wp), intent(inout), optional :: t                      !! time, goes on by nsteps*h; from 0
-        class(body_drift), intent(in), optional :: drift            !! default: the free flow, in a batch
+        class(body_drift), intent(in), optional, target :: drift    !! default: the free flow, in a batch
         logical, intent(in), optional :: compensated                !! default: .false.
+        real(wp), contiguous, intent(inout), optional :: rests(:, :)    !! (7, n): what m and q lack; from 0
         integer, intent(out), optional :: stat                      !! status code
-        type(timetable) :: table
-        type(group_state) :: now, seen
-        real(wp), allocatable :: tau(:, :)
-        real(wp) :: start
-        integer :: body_status, code, spacing, step, i
+        type(splitting_plan) :: plan
+        type(group_run) :: run
+        real(wp) :: time
+        integer :: body_status, code, spacing, i, n
 
         body_status = status_ok
         do i = 1, size(body)
             if (body_status == status_ok) body_status = body(i)%status()
         end do
-        call check_run(body_status, scheme, h, nsteps, spacing, start, code, every, t)
-        if (code == status_ok) code = check_group(size(body), m, q)
-        if (code /= status_ok) then
-            call conclude(code, 'integrate', stat)
-            return
-        end if
-
-        table = new_timetable(scheme, h, compensated)
-        now%m = m
-        now%q = q
-        allocate (tau(3, size(m, 2)), source=0.0_wp)
-        if (table%compensated) then
-            allocate (now%m_rest(3, size(m, 2)), now%m_new(3, size(m, 2)), source=0.0_wp)
-            allocate (now%q_rest(4, size(m, 2)), now%turn(4, size(m, 2)), source=0.0_wp)
-        end if
-        if (present(observer)) then
-            seen = now
-            call observer%observe(0, start, now%m, now%q)
-        end if
-        if (nsteps > 0) then
-            if (.not. table%drift_first) call scene%torques(now%q, start, tau)
-            call outer_stage(body, table, table%outer, tau, now, code, drift)
-        end if
-        do step = 1, nsteps
-            if (code /= status_ok) exit
-            call inner_stages(body, table, scene, start + (step - 1)*h, now, tau, code, drift)
-            if (code /= status_ok) exit
-            if (present(observer)) then
-                if (mod(step, spacing) == 0) then
-                    call copy_state(now, seen)
-                    call outer_stage(body, table, table%outer, tau, seen, code, drift)
-                    if (code /= status_ok) exit
-                    call observer%observe(step, start + step*h, seen%m, seen%q)
+        call check_run(body_status, scheme, h, nsteps, spacing, time, code, every, t)
+        if (code == status_ok) code = check_group(size(body), m, q, rests)
+        call scene%agree(code)
+        if (code == status_ok) then
+            n = size(m, 2)
+            plan = splitting_plan(scheme, h)
+            run%m = m
+            run%q = q
+            allocate (run%tau(3, n), source=0.0_wp)
+            allocate (run%kept_m(3, n), run%kept_q(4, n))
+            if (present(compensated)) run%compensated = compensated
+            if (run%compensated) then
+                allocate (run%m_rest(3, n), run%m_new(3, n), run%q_rest(4, n), run%turn(4, n), source=0.0_wp)
+                allocate (run%kept_m_rest(3, n), run%kept_q_rest(4, n))
+                if (present(rests)) then
+                    run%m_rest(:, :) = rests(1:3, :)
+                    run%q_rest(:, :) = rests(4:7, :)
                 end if
             end if
-            call outer_stage(body, table, merge(table%joint, table%outer, step < nsteps), tau, now, code, &
-                             drift)
-        end do
-
-        if (code == status_ok .and. .not. all(ieee_is_finite(now%m))) code = status_bad_torque
-        if (code == status_ok) then
-            m = now%m
-            q = now%q
-            if (present(t)) t = start + nsteps*h
+            run%body => body
+            run%core = core_of(body)
+            run%scene => scene
+            if (present(observer)) run%observer => observer
+            if (present(drift)) run%drift => drift
+            run%largest_torque = largest_momentum/max(1.0_wp, maxval(abs(plan%kick)))
+            call run_steps(run, plan, h, nsteps, present(observer), spacing, time, code)
+            m = run%m
+            q = run%q
+            if (present(t)) t = time
+            if (present(rests) .and. run%compensated) then
+                rests(1:3, :) = run%m_rest
+                rests(4:7, :) = run%q_rest
+            end if
         end if
+        ! An observer that stops a run has done what it was there for.
+        if (code == status_stopped .and. .not. present(stat)) return
         call conclude(code, 'integrate', stat)
     end subroutine integrate_group
 
-    !> A copy of `from` in `to`, both allocated alike: plain assignment would allocate anew.
-    pure subroutine copy_state(from, to)
-        type(group_state), intent(in) :: from
-        type(group_state), intent(inout) :: to
-
-        to%m(:, :) = from%m
-        to%q(:, :) = from%q
-        if (allocated(from%m_rest)) then
-            to%m_rest(:, :) = from%m_rest
-            to%q_rest(:, :) = from%q_rest
-        end if
-    end subroutine copy_state
-
-    !> All stages of a step but the outer ones; leaves the last torques in `tau`.
-    subroutine inner_stages(body, table, scene, start, now, tau, code, drift)
-        type(rigid_body), intent(in) :: body(:)
-        type(timetable), intent(in) :: table
-        class(group_scene), intent(in) :: scene
-        real(wp), intent(in) :: start               ! time at the start of the step
-        type(group_state), intent(inout) :: now
-        real(wp), contiguous, intent(inout) :: tau(:, :)
+    subroutine stage_of_group(self, drift, time, kick, code)
+        class(group_run), intent(inout) :: self
+        real(wp), intent(in) :: drift, time, kick
         integer, intent(out) :: code
-        class(body_drift), intent(in), optional :: drift
-        integer :: i
+        integer :: i, refused
 
         code = status_ok
-        do i = 1, table%stages
-            if (i > 1 .or. .not. table%drift_first) then
-                call do_drift(body, table, table%drift(i), now, code, drift)
+        if (abs(drift) > 0.0_wp) then
+            call advance_group(self, drift, code)
+            if (associated(self%drift)) then
+                call self%scene%agree(code)
                 if (code /= status_ok) return
             end if
-            call scene%torques(now%q, start + table%time(i), tau)
-            if (i < table%stages .or. table%drift_first) then
-                call do_kick(table, table%kick(i), tau, now, code)
-                if (code /= status_ok) return
-            end if
-        end do
-    end subroutine inner_stages
-
-    !> The stage that closes a step, or closes one and opens the next; a kick by the torques at hand.
-    subroutine outer_stage(body, table, amount, tau, now, code, drift)
-        type(rigid_body), intent(in) :: body(:)
-        type(timetable), intent(in) :: table
-        real(wp), intent(in) :: amount              ! coefficient times h
-        real(wp), contiguous, intent(in) :: tau(:, :)
-        type(group_state), intent(inout) :: now
-        integer, intent(out) :: code
-        class(body_drift), intent(in), optional :: drift
-
-        if (table%drift_first) then
-            call do_drift(body, table, amount, now, code, drift)
-        else
-            call do_kick(table, amount, tau, now, code)
         end if
-    end subroutine outer_stage
-
-    !> The free bodies for a time h.
-    subroutine do_drift(body, table, h, now, code, drift)
-        type(rigid_body), intent(in) :: body(:)
-        type(timetable), intent(in) :: table
-        real(wp), intent(in) :: h
-        type(group_state), intent(inout) :: now
-        integer, intent(out) :: code
-        class(body_drift), intent(in), optional :: drift
-        integer :: i
-
-        if (.not. table%compensated) then
-            call advance_all(body, h, now%m, now%q, code, drift)
-        else
-            now%m_new(:, :) = now%m
-            now%turn(1, :) = 1.0_wp
-            now%turn(2:4, :) = 0.0_wp
-            call advance_all(body, h, now%m_new, now%turn, code, drift)
+        if (.not. self%torque_known) then
+            ! Also where the free flow has refused, which leaves q valid: others may take part in the torque.
+            call self%scene%torques(self%q, time, self%tau, refused)
+            if (code == status_ok) code = refused
+            if (code == status_ok) then
+                if (.not. (all_below(self%tau, self%largest_torque) &
+                           .and. all_below(self%m, largest_momentum))) code = status_bad_torque
+            end if
+            call self%scene%agree(code)
             if (code /= status_ok) return
-            do i = 1, size(now%m, 2)
-                call turn_state(core_of(body(min(i, size(body)))), now%turn(:, i), now%m(:, i), &
-                                now%m_rest(:, i), now%q(:, i), now%q_rest(:, i))
-            end do
+            self%torque_known = .true.
         end if
-    end subroutine do_drift
-
-    !> All bodies, in place: the batch form of the free flow, or the user's drift one by one.
-    subroutine advance_all(body, h, m, q, code, drift)
-        type(rigid_body), intent(in) :: body(:)
-        real(wp), intent(in) :: h
-        real(wp), contiguous, intent(inout) :: m(:, :), q(:, :)
-        integer, intent(out) :: code
-        class(body_drift), intent(in), optional :: drift
-        integer :: i
-
-        code = status_ok
-        if (present(drift)) then
-            do i = 1, size(m, 2)
-                call drift%advance(body(min(i, size(body))), h, m(:, i), q(:, i), code)
-                if (code /= status_ok) return
+        if (self%compensated) then
+            do i = 1, size(self%tau, 2)
+                call kick_state(kick, self%tau(:, i), self%m(:, i), self%m_rest(:, i))
             end do
-        else if (size(body) == 1) then
-            call free_flow(body(1), h, m, q, code)
         else
-            call free_flow(body, h, m, q, code)
+            self%m(:, :) = self%m + kick*self%tau
         end if
-    end subroutine advance_all
+    end subroutine stage_of_group
 
-    !> m + h tau.
-    pure subroutine do_kick(table, h, tau, now, code)
-        type(timetable), intent(in) :: table
-        real(wp), intent(in) :: h
-        real(wp), contiguous, intent(in) :: tau(:, :)
-        type(group_state), intent(inout) :: now
-        integer, intent(out) :: code
+    !> Whether the sizes of the three numbers of each column add up to less than `bound`; a NaN or Inf shows
+    !> in the sum, which is compared only when there is none.
+    pure function all_below(v, bound) result(good)
+        real(wp), contiguous, intent(in) :: v(:, :)
+        real(wp), intent(in) :: bound
+        logical :: good
         real(wp) :: total
         integer :: i
 
-        code = status_bad_torque
-        do i = 1, size(tau, 2)
-            total = 0.25_wp*abs(tau(1, i)) + 0.25_wp*abs(tau(2, i)) + 0.25_wp*abs(tau(3, i))
-            if (.not. ieee_is_finite(total)) return
-            if (total > 0.25_wp*table%largest_torque) return
+        good = .true.
+        do i = 1, size(v, 2)
+            total = 0.25_wp*abs(v(1, i)) + 0.25_wp*abs(v(2, i)) + 0.25_wp*abs(v(3, i))
+            good = ieee_is_finite(total)
+            if (good) good = total <= 0.25_wp*bound
+            if (.not. good) return
         end do
+    end function all_below
+
+    !> A drift that closes a step.
+    subroutine move_group(self, h, code)
+        class(group_run), intent(inout) :: self
+        real(wp), intent(in) :: h
+        integer, intent(out) :: code
+
+        call advance_group(self, h, code)
+        call self%scene%agree(code)
+    end subroutine move_group
+
+    !> The free bodies for a time h.
+    subroutine advance_group(self, h, code)
+        class(group_run), intent(inout) :: self
+        real(wp), intent(in) :: h
+        integer, intent(out) :: code
+        integer :: i
+
+        self%torque_known = .false.
+        if (.not. self%compensated) then
+            call advance_all(self, h, self%m, self%q, code)
+        else
+            self%m_new(:, :) = self%m
+            self%turn(1, :) = 1.0_wp
+            self%turn(2:4, :) = 0.0_wp
+            call advance_all(self, h, self%m_new, self%turn, code)
+            if (code == status_ok) then
+                do i = 1, size(self%m, 2)
+                    call turn_state(self%core(min(i, size(self%core))), self%turn(:, i), self%m(:, i), &
+                                    self%m_rest(:, i), self%q(:, i), self%q_rest(:, i))
+                end do
+            end if
+        end if
+        if (associated(self%drift) .and. code == status_ok) then
+            if (.not. all(ieee_is_finite(self%m))) code = status_bad_momentum
+            if (.not. all(ieee_is_finite(self%q))) code = status_bad_attitude
+        end if
+    end subroutine advance_group
+
+    !> All bodies, in place: the batch form of the free flow, or the user's drift one by one.
+    subroutine advance_all(self, h, m, q, code)
+        class(group_run), intent(in) :: self
+        real(wp), intent(in) :: h
+        real(wp), contiguous, intent(inout) :: m(:, :), q(:, :)
+        integer, intent(out) :: code
+        integer :: i
+
         code = status_ok
-        if (table%compensated) then
-            do i = 1, size(tau, 2)
-                call kick_state(h, tau(:, i), now%m(:, i), now%m_rest(:, i))
+        if (associated(self%drift)) then
+            do i = 1, size(m, 2)
+                call self%drift%advance(self%body(min(i, size(self%body))), h, m(:, i), q(:, i), code)
+                if (code /= status_ok) return
             end do
         else
-            now%m = now%m + h*tau
+            call flow_many(self%core, size(self%core), h, size(m, 2), m, code, q)
         end if
-    end subroutine do_kick
+    end subroutine advance_all
+
+    subroutine keep_group(self)
+        class(group_run), intent(inout) :: self
+
+        self%kept_m(:, :) = self%m
+        self%kept_q(:, :) = self%q
+        if (self%compensated) then
+            self%kept_m_rest(:, :) = self%m_rest
+            self%kept_q_rest(:, :) = self%q_rest
+        end if
+    end subroutine keep_group
+
+    subroutine go_back_group(self)
+        class(group_run), intent(inout) :: self
+
+        self%m(:, :) = self%kept_m
+        self%q(:, :) = self%kept_q
+        if (self%compensated) then
+            self%m_rest(:, :) = self%kept_m_rest
+            self%q_rest(:, :) = self%kept_q_rest
+        end if
+    end subroutine go_back_group
+
+    subroutine show_group(self, step, t, code)
+        class(group_run), intent(inout) :: self
+        integer(int64), intent(in) :: step
+        real(wp), intent(in) :: t
+        integer, intent(out) :: code
+        logical :: stop_here
+
+        stop_here = .false.
+        call self%observer%observe(step, t, self%m, self%q, stop_here)
+        code = merge(status_stopped, status_ok, stop_here)
+        call self%scene%agree(code)
+    end subroutine show_group
 
     !> Sizes and values of the state of a group.
-    pure function check_group(bodies, m, q) result(code)
+    pure function check_group(bodies, m, q, rests) result(code)
         integer, intent(in) :: bodies
         real(wp), intent(in) :: m(:, :), q(:, :)
+        real(wp), intent(in), optional :: rests(:, :)
         integer :: code
         integer :: n, i
 
@@ -257,11 +262,17 @@ contains
         code = status_bad_count
         if (size(m, 1) /= 3 .or. size(q, 1) /= 4 .or. size(q, 2) /= n) return
         if (bodies /= 1 .and. bodies /= n) return
+        if (present(rests)) then
+            if (size(rests, 1) /= 7 .or. size(rests, 2) /= n) return
+        end if
         code = status_bad_momentum
         if (.not. all(ieee_is_finite(m))) return
+        if (present(rests)) then
+            if (.not. all(ieee_is_finite(rests))) return
+        end if
         code = status_bad_attitude
         do i = 1, n
-            if (.not. is_attitude(q(:, i))) return
+            if (.not. is_unit_quat(q(:, i))) return
         end do
         code = status_ok
     end function check_group

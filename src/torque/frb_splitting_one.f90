@@ -1,183 +1,218 @@
 !> The run of one body: see frb_splitting.
 module frb_splitting_one
     use frb_exact_updates, only: turn_state, kick_state
-    use frb_free_flow, only: core_of, free_flow, rigid_body
+    use frb_flow_one, only: flow_body
+    use frb_free_flow, only: core_of, rigid_body
+    use frb_inertia, only: body_core
     use frb_kinds, only: wp
+    use frb_rotations, only: is_unit_quat
     use frb_schemes, only: splitting_scheme
-    use frb_splitting_plan, only: timetable, new_timetable, check_run, is_attitude
-    use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_momentum, status_bad_torque
+    use frb_splitting_plan, only: splitting_plan, check_run
+    use frb_splitting_run, only: splitting_run, run_steps, largest_momentum
+    use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_momentum, status_bad_torque, &
+        status_stopped
     use frb_torque, only: body_scene, body_observer, body_drift
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+    use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
     public :: integrate_body
 
-    !> Momentum and attitude, and what they lack in a compensated run.
-    type :: body_state
+    !> Momentum and attitude, what they lack in a compensated run, and all of it at the last whole step.
+    type, extends(splitting_run) :: body_run
         real(wp) :: m(3) = 0.0_wp
         real(wp) :: q(4) = 0.0_wp
         real(wp) :: m_rest(3) = 0.0_wp
         real(wp) :: q_rest(4) = 0.0_wp
-    end type body_state
+        real(wp) :: tau(3) = 0.0_wp
+        real(wp) :: kept(14) = 0.0_wp
+        type(body_core) :: core
+        type(rigid_body), pointer :: body => null()
+        class(body_scene), pointer :: scene => null()
+        class(body_observer), pointer :: observer => null()
+        class(body_drift), pointer :: drift => null()           !! null: the free flow
+    contains
+        procedure :: stage => stage_of_body
+        procedure :: move => move_body
+        procedure :: keep => keep_body
+        procedure :: go_back => go_back_body
+        procedure :: show => show_body
+    end type body_run
 
 contains
 
     !> One body.
     subroutine integrate_body(body, scheme, scene, h, nsteps, m, q, observer, every, t, drift, &
-                               compensated, stat)
-        type(rigid_body), intent(in) :: body
+                              compensated, rests, stat)
+        type(rigid_body), intent(in), target :: body
         type(splitting_scheme), intent(in) :: scheme
-        class(body_scene), intent(in) :: scene                      !! the torque
+        class(body_scene), intent(inout), target :: scene           !! the torque
         real(wp), intent(in) :: h                                   !! step, of either sign, not zero
-        integer, intent(in) :: nsteps                               !! number of steps, >= 0
+        integer(int64), intent(in) :: nsteps                        !! number of steps, >= 0
         real(wp), intent(inout) :: m(3)                             !! angular momentum, body frame
         real(wp), intent(inout) :: q(4)                             !! attitude, unit quaternion
-        class(body_observer), intent(inout), optional :: observer   !! at the start and every `every` steps
+        class(body_observer), intent(inout), optional, target :: observer  !! at start, every `every` steps
         integer, intent(in), optional :: every                      !! >= 1, default 1
         real(wp), intent(inout), optional :: t                      !! time, goes on by nsteps*h; from 0
-        class(body_drift), intent(in), optional :: drift            !! default: the free flow
+        class(body_drift), intent(in), optional, target :: drift    !! default: the free flow
         logical, intent(in), optional :: compensated                !! default: .false.
+        real(wp), intent(inout), optional :: rests(7)               !! what m and q lack, compensated; from 0
         integer, intent(out), optional :: stat                      !! status code
-        type(timetable) :: table
-        type(body_state) :: now, seen
-        real(wp) :: tau(3), start
-        integer :: code, spacing, step
+        type(splitting_plan) :: plan
+        type(body_run) :: run
+        real(wp) :: time
+        integer :: code, spacing
 
-        call check_run(body%status(), scheme, h, nsteps, spacing, start, code, every, t)
+        call check_run(body%status(), scheme, h, nsteps, spacing, time, code, every, t)
         if (code == status_ok .and. .not. all(ieee_is_finite(m))) code = status_bad_momentum
+        if (code == status_ok .and. .not. is_unit_quat(q)) code = status_bad_attitude
+        if (present(compensated)) run%compensated = compensated
+        if (present(rests) .and. run%compensated) then
+            run%m_rest = rests(1:3)
+            run%q_rest = rests(4:7)
+            if (code == status_ok .and. .not. all(ieee_is_finite(rests))) code = status_bad_momentum
+        end if
+        call scene%agree(code)
         if (code == status_ok) then
-            if (.not. is_attitude(q)) code = status_bad_attitude
+            plan = splitting_plan(scheme, h)
+            run%m = m
+            run%q = q
+            run%body => body
+            run%core = core_of(body)
+            run%scene => scene
+            if (present(observer)) run%observer => observer
+            if (present(drift)) run%drift => drift
+            run%largest_torque = largest_momentum/max(1.0_wp, maxval(abs(plan%kick)))
+            call run_steps(run, plan, h, nsteps, present(observer), spacing, time, code)
+            m = run%m
+            q = run%q
+            if (present(t)) t = time
+            if (present(rests) .and. run%compensated) rests = [run%m_rest, run%q_rest]
         end if
-        if (code /= status_ok) then
-            call conclude(code, 'integrate', stat)
-            return
-        end if
-
-        table = new_timetable(scheme, h, compensated)
-        now%m = m
-        now%q = q
-        tau = 0.0_wp
-        if (present(observer)) call observer%observe(0, start, now%m, now%q)
-        if (nsteps > 0) then
-            if (.not. table%drift_first) call scene%torque(now%q, start, tau)
-            call outer_stage(body, table, table%outer, tau, now, code, drift)
-        end if
-        do step = 1, nsteps
-            if (code /= status_ok) exit
-            call inner_stages(body, table, scene, start + (step - 1)*h, now, tau, code, drift)
-            if (code /= status_ok) exit
-            if (present(observer)) then
-                if (mod(step, spacing) == 0) then
-                    seen = now
-                    call outer_stage(body, table, table%outer, tau, seen, code, drift)
-                    if (code /= status_ok) exit
-                    call observer%observe(step, start + step*h, seen%m, seen%q)
-                end if
-            end if
-            call outer_stage(body, table, merge(table%joint, table%outer, step < nsteps), tau, now, code, &
-                             drift)
-        end do
-
-        if (code == status_ok .and. .not. all(ieee_is_finite(now%m))) code = status_bad_torque
-        if (code == status_ok) then
-            m = now%m
-            q = now%q
-            if (present(t)) t = start + nsteps*h
-        end if
+        ! An observer that stops a run has done what it was there for.
+        if (code == status_stopped .and. .not. present(stat)) return
         call conclude(code, 'integrate', stat)
     end subroutine integrate_body
 
-    !> All stages of a step but the outer ones; leaves the last torque in `tau`.
-    subroutine inner_stages(body, table, scene, start, now, tau, code, drift)
-        type(rigid_body), intent(in) :: body
-        type(timetable), intent(in) :: table
-        class(body_scene), intent(in) :: scene
-        real(wp), intent(in) :: start               ! time at the start of the step
-        type(body_state), intent(inout) :: now
-        real(wp), intent(out) :: tau(3)
+    subroutine stage_of_body(self, drift, time, kick, code)
+        class(body_run), intent(inout) :: self
+        real(wp), intent(in) :: drift, time, kick
         integer, intent(out) :: code
-        class(body_drift), intent(in), optional :: drift
-        integer :: i
+        integer :: refused
 
         code = status_ok
-        do i = 1, table%stages
-            if (i > 1 .or. .not. table%drift_first) then
-                call do_drift(body, table, table%drift(i), now, code, drift)
+        if (abs(drift) > 0.0_wp) then
+            call advance_body(self, drift, code)
+            if (associated(self%drift)) then
+                call self%scene%agree(code)
                 if (code /= status_ok) return
             end if
-            call scene%torque(now%q, start + table%time(i), tau)
-            if (i < table%stages .or. table%drift_first) then
-                call do_kick(table, table%kick(i), tau, now, code)
-                if (code /= status_ok) return
-            end if
-        end do
-    end subroutine inner_stages
-
-    !> The stage that closes a step, or closes one and opens the next; a kick by the torque at hand.
-    subroutine outer_stage(body, table, amount, tau, now, code, drift)
-        type(rigid_body), intent(in) :: body
-        type(timetable), intent(in) :: table
-        real(wp), intent(in) :: amount              ! coefficient times h
-        real(wp), intent(in) :: tau(3)
-        type(body_state), intent(inout) :: now
-        integer, intent(out) :: code
-        class(body_drift), intent(in), optional :: drift
-
-        if (table%drift_first) then
-            call do_drift(body, table, amount, now, code, drift)
-        else
-            call do_kick(table, amount, tau, now, code)
         end if
-    end subroutine outer_stage
-
-    !> The free body for a time h.
-    subroutine do_drift(body, table, h, now, code, drift)
-        type(rigid_body), intent(in) :: body
-        type(timetable), intent(in) :: table
-        real(wp), intent(in) :: h
-        type(body_state), intent(inout) :: now
-        integer, intent(out) :: code
-        class(body_drift), intent(in), optional :: drift
-        real(wp) :: m(3), turn(4)
-
-        if (.not. table%compensated) then
-            if (present(drift)) then
-                call drift%advance(body, h, now%m, now%q, code)
-            else
-                call free_flow(body, h, now%m, now%q, code)
+        if (.not. self%torque_known) then
+            ! Also where the free flow has refused, which leaves q valid: others may take part in the torque.
+            call self%scene%torque(self%q, time, self%tau, refused)
+            if (code == status_ok) code = refused
+            if (code == status_ok) then
+                if (.not. (all_below(self%tau, self%largest_torque) &
+                           .and. all_below(self%m, largest_momentum))) code = status_bad_torque
             end if
-        else
-            m = now%m
-            turn = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-            if (present(drift)) then
-                call drift%advance(body, h, m, turn, code)
-            else
-                call free_flow(body, h, m, turn, code)
-            end if
-            if (code == status_ok) call turn_state(core_of(body), turn, now%m, now%m_rest, now%q, now%q_rest)
+            call self%scene%agree(code)
+            if (code /= status_ok) return
+            self%torque_known = .true.
         end if
-    end subroutine do_drift
+        if (self%compensated) then
+            call kick_state(kick, self%tau, self%m, self%m_rest)
+        else
+            self%m = self%m + kick*self%tau
+        end if
+    end subroutine stage_of_body
 
-    !> m + h tau.
-    pure subroutine do_kick(table, h, tau, now, code)
-        type(timetable), intent(in) :: table
-        real(wp), intent(in) :: h, tau(3)
-        type(body_state), intent(inout) :: now
-        integer, intent(out) :: code
+    !> Whether the sizes of three numbers add up to less than `bound`; a NaN or Inf shows in the sum, which is
+    !> compared only when there is none.
+    pure function all_below(v, bound) result(good)
+        real(wp), intent(in) :: v(3), bound
+        logical :: good
         real(wp) :: total
 
-        ! A NaN or Inf shows in the sum, which is compared only when there is none.
-        code = status_bad_torque
-        total = 0.25_wp*abs(tau(1)) + 0.25_wp*abs(tau(2)) + 0.25_wp*abs(tau(3))
-        if (.not. ieee_is_finite(total)) return
-        if (total > 0.25_wp*table%largest_torque) return
-        code = status_ok
-        if (table%compensated) then
-            call kick_state(h, tau, now%m, now%m_rest)
+        total = 0.25_wp*abs(v(1)) + 0.25_wp*abs(v(2)) + 0.25_wp*abs(v(3))
+        good = ieee_is_finite(total)
+        if (good) good = total <= 0.25_wp*bound
+    end function all_below
+
+    !> A drift that closes a step.
+    subroutine move_body(self, h, code)
+        class(body_run), intent(inout) :: self
+        real(wp), intent(in) :: h
+        integer, intent(out) :: code
+
+        call advance_body(self, h, code)
+        call self%scene%agree(code)
+    end subroutine move_body
+
+    !> The free body for a time h.
+    subroutine advance_body(self, h, code)
+        class(body_run), intent(inout) :: self
+        real(wp), intent(in) :: h
+        integer, intent(out) :: code
+        real(wp) :: m(3), turn(4)
+
+        self%torque_known = .false.
+        if (.not. self%compensated) then
+            if (associated(self%drift)) then
+                call self%drift%advance(self%body, h, self%m, self%q, code)
+            else
+                call flow_body(self%core, h, self%m, code, self%q)
+            end if
         else
-            now%m = now%m + h*tau
+            m = self%m
+            turn = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+            if (associated(self%drift)) then
+                call self%drift%advance(self%body, h, m, turn, code)
+            else
+                call flow_body(self%core, h, m, code, turn)
+            end if
+            if (code == status_ok) then
+                call turn_state(self%core, turn, self%m, self%m_rest, self%q, self%q_rest)
+            end if
         end if
-    end subroutine do_kick
+        if (associated(self%drift) .and. code == status_ok) then
+            if (.not. all(ieee_is_finite(self%m))) code = status_bad_momentum
+            if (.not. all(ieee_is_finite(self%q))) code = status_bad_attitude
+        end if
+    end subroutine advance_body
+
+    subroutine keep_body(self)
+        class(body_run), intent(inout) :: self
+
+        self%kept(1:3) = self%m
+        self%kept(4:7) = self%q
+        if (self%compensated) then
+            self%kept(8:10) = self%m_rest
+            self%kept(11:14) = self%q_rest
+        end if
+    end subroutine keep_body
+
+    subroutine go_back_body(self)
+        class(body_run), intent(inout) :: self
+
+        self%m = self%kept(1:3)
+        self%q = self%kept(4:7)
+        self%m_rest = self%kept(8:10)
+        self%q_rest = self%kept(11:14)
+    end subroutine go_back_body
+
+    subroutine show_body(self, step, t, code)
+        class(body_run), intent(inout) :: self
+        integer(int64), intent(in) :: step
+        real(wp), intent(in) :: t
+        integer, intent(out) :: code
+        logical :: stop_here
+
+        stop_here = .false.
+        call self%observer%observe(step, t, self%m, self%q, stop_here)
+        code = merge(status_stopped, status_ok, stop_here)
+        call self%scene%agree(code)
+    end subroutine show_body
 
 end module frb_splitting_one

@@ -1,75 +1,131 @@
-!> What a run of a splitting scheme is made of, for one body and for many: the stages multiplied by h, and
-!> the checks every call has in common.
+!> What one step of a splitting scheme is made of, for `integrate` and for loops of the user's own; and the
+!> checks every call of `integrate` has in common.
 module frb_splitting_plan
     use frb_kinds, only: wp
-    use frb_schemes, only: splitting_scheme, most_stages
-    use frb_status, only: status_ok, status_bad_count, status_bad_time
+    use frb_schemes, only: splitting_scheme
+    use frb_status, only: status_ok, status_bad_count, status_bad_scheme, status_bad_time
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+    use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
-    public :: timetable, new_timetable, check_run, is_attitude
+    public :: splitting_plan, check_run, next_time
 
-    !> The stages of a chain of steps, multiplied by h. Within a step come drift(i), the torque at time(i),
-    !> kick(i), without the first drift (ABA) or the last kick (BAB): that is the outer stage, shared by two
-    !> steps.
-    type :: timetable
-        integer :: stages = 0                   ! torque evaluations per step
-        logical :: drift_first = .true.         ! ABA: the outer stage is a drift
-        real(wp) :: drift(most_stages) = 0.0_wp
-        real(wp) :: kick(most_stages) = 0.0_wp
-        real(wp) :: time(most_stages) = 0.0_wp  ! of each torque, from the start of the step
-        real(wp) :: outer = 0.0_wp              ! outer stage at the start of the run and where it ends
-        real(wp) :: joint = 0.0_wp              ! outer stage between two steps
-        real(wp) :: largest_torque = 0.0_wp     ! of a torque whose kicks do not overflow
-        logical :: compensated = .false.
-    end type timetable
+    !> h times coefficients, and start and end of a run: beyond it they could overflow.
+    real(wp), parameter :: longest = 1.0e-7_wp*huge(1.0_wp)     ! coefficients are at most 1e6
+
+    !> One step of size h of a scheme: `splitting_plan(scheme, h)`. This loop is the whole recipe, for every
+    !> scheme, with whatever else moves, here centres of mass x with momenta p:
+    !>
+    !>     do i = 1, plan%stages
+    !>         call free_flow(body, plan%drift(i), m, q);  x = x + plan%drift(i)*p/mass
+    !>         call my_forces(x, q, t + plan%time(i), f, tau)
+    !>         m = m + plan%kick(i)*tau;  p = p + plan%kick(i)*f
+    !>     end do
+    !>     call free_flow(body, plan%drift(i), m, q);  x = x + plan%drift(i)*p/mass     ! i is stages + 1
+    !>     t = t + h
+    !>
+    !> `integrate` takes these steps, to the last bit. A scheme that opens and closes with kicks (BAB) has a
+    !> zero drift at both ends. Then nothing has moved since the last torque of the step before, and it can be
+    !> kept, with `known = .false.` before the first step:
+    !>
+    !>     known = known .and. i == 1 .and. .not. abs(plan%drift(i)) > 0
+    !>     if (.not. known) call my_forces(x, q, t + plan%time(i), f, tau);  known = .true.
+    type :: splitting_plan
+        integer :: status = status_bad_scheme   !! `status_ok`, or why there is no plan; then no stages
+        integer :: stages = 0                   !! kicks in a step
+        real(wp), allocatable :: drift(:)       !! (stages + 1): time of each drift
+        real(wp), allocatable :: kick(:)        !! (stages): what each torque is multiplied by
+        real(wp), allocatable :: time(:)        !! (stages): of each torque, from the start of the step
+    end type splitting_plan
+
+    interface splitting_plan
+        module procedure plan_of_step
+        module procedure plan_of_step_with_stat
+    end interface splitting_plan
 
 contains
 
-    !> The scheme's stages for steps of size h.
-    pure function new_timetable(scheme, h, compensated) result(table)
+    !> The plan of a step of size h, of either sign. `status`: that of a scheme that could not be made;
+    !> `status_bad_time` for h zero, not finite or beyond 1e301.
+    pure function plan_of_step(scheme, h) result(plan)
         type(splitting_scheme), intent(in) :: scheme
         real(wp), intent(in) :: h
-        logical, intent(in), optional :: compensated
-        type(timetable) :: table
+        type(splitting_plan) :: plan
         real(wp) :: a(scheme%drifts), b(scheme%kicks)
         integer :: i, s
 
+        plan%status = scheme%status
+        if (plan%status == status_ok .and. .not. is_step(h)) plan%status = status_bad_time
+        s = 0
+        if (plan%status == status_ok) s = scheme%kicks
+        plan%stages = s
+        allocate (plan%drift(s + 1), source=0.0_wp)
+        allocate (plan%kick(s), plan%time(s), source=0.0_wp)
+        if (s == 0) return
         a = scheme%drift_coefficients()
         b = scheme%kick_coefficients()
-        s = scheme%stages()
-        table%stages = s
-        if (present(compensated)) table%compensated = compensated
-        table%drift_first = scheme%drift_first
-        table%time(1:s) = [(sum(a(1:i))*h, i=1, s)]
+        plan%kick(:) = b*h
         if (scheme%drift_first) then
-            table%outer = a(1)*h
-            table%joint = 2*a(1)*h
-            table%drift(2:s) = a(2:s)*h
-            table%kick(1:s) = b*h
+            plan%drift(:) = a*h
+            plan%time(:) = [(sum(a(1:i))*h, i=1, s)]
         else
-            table%outer = b(1)*h
-            table%joint = 2*b(1)*h
-            table%drift(1:s) = a*h
-            table%kick(1:s - 1) = b(2:s)*h
-            table%time(s) = h
+            plan%drift(2:s) = a*h
+            plan%time(2:s) = [(sum(a(1:i))*h, i=1, s - 1)]
+            plan%time(s) = h
         end if
-        table%largest_torque = 0.1_wp*huge(h)/max(1.0_wp, maxval(abs(table%kick)), abs(table%joint))
-    end function new_timetable
+    end function plan_of_step
+
+    !> The same, with its status in `stat` too.
+    function plan_of_step_with_stat(scheme, h, stat) result(plan)
+        type(splitting_scheme), intent(in) :: scheme
+        real(wp), intent(in) :: h
+        integer, intent(out) :: stat
+        type(splitting_plan) :: plan
+
+        plan = plan_of_step(scheme, h)
+        stat = plan%status
+    end function plan_of_step_with_stat
+
+    !> Whether h can be a step.
+    pure function is_step(h) result(good)
+        real(wp), intent(in) :: h
+        logical :: good
+
+        good = ieee_is_finite(h)
+        if (good) good = abs(h) > 0.0_wp .and. abs(h) <= longest
+    end function is_step
+
+    !> The time one step after t: t + (n + 1) h - n h rounded, n the steps from zero to t. It depends on t and
+    !> h alone, so that a run goes on from t as it would have gone on without a stop; and the rounding errors
+    !> of n h take each other back, so that it stays within a few units of the last digit of start + steps*h.
+    pure function next_time(t, h) result(next)
+        real(wp), intent(in) :: t, h
+        real(wp) :: next
+        real(wp), parameter :: resolved = 2.0_wp**(-52)
+        ! Between whole numbers, where t/h is seldom: n goes up by one in each step.
+        real(wp), parameter :: between = 0.38_wp
+        real(wp) :: n
+
+        if (abs(t)*resolved < abs(h)) then
+            n = floor(t/h + between, int64)
+            next = t + ((n + 1)*h - n*h)
+        else
+            next = t + h
+        end if
+    end function next_time
 
     !> What is common to every call: first thing that is wrong, and defaults.
     pure subroutine check_run(body_status, scheme, h, nsteps, spacing, start, code, every, t)
         integer, intent(in) :: body_status
         type(splitting_scheme), intent(in) :: scheme
         real(wp), intent(in) :: h
-        integer, intent(in) :: nsteps
+        integer(int64), intent(in) :: nsteps
         integer, intent(out) :: spacing
         real(wp), intent(out) :: start
         integer, intent(out) :: code
         integer, intent(in), optional :: every
         real(wp), intent(in), optional :: t
-        real(wp), parameter :: longest = 1.0e-7_wp*huge(1.0_wp)  ! coefficients are at most 1e6
 
         spacing = 1
         if (present(every)) spacing = every
@@ -80,21 +136,10 @@ contains
         if (code == status_ok .and. (nsteps < 0 .or. spacing < 1)) code = status_bad_count
         if (code == status_ok) then
             code = status_bad_time
-            if (ieee_is_finite(h) .and. ieee_is_finite(start)) then
-                if (abs(h) > 0.0_wp .and. abs(h) <= longest/max(nsteps, 1) .and. abs(start) <= longest) then
-                    code = status_ok
-                end if
+            if (is_step(h) .and. ieee_is_finite(start)) then
+                if (abs(h) <= longest/max(nsteps, 1_int64) .and. abs(start) <= longest) code = status_ok
             end if
         end if
     end subroutine check_run
-
-    !> Whether q can stand for an attitude: finite and not zero.
-    pure function is_attitude(q) result(good)
-        real(wp), intent(in) :: q(4)
-        logical :: good
-
-        good = all(ieee_is_finite(q))
-        if (good) good = any(abs(q) > 0.0_wp)
-    end function is_attitude
 
 end module frb_splitting_plan

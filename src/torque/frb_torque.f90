@@ -2,12 +2,17 @@
 !> the drift (who moves the free body, when it is not to be the free flow). All three are extensible types, so
 !> that parameters travel in components and nothing is global.
 !>
+!> Scenes and observers may count, keep lists and buffers, talk to other processes: `self` is intent(inout)
+!> and nothing has to be pure; a pure procedure may take the place of one that need not be.
+!>
 !> Torque and momentum are in the body frame: m' = m x I^-1 m + tau(q, t), q' = q (0, I^-1 m)/2. A torque from
 !> a potential V(q) is tau = sum over body vectors u = Q^T u0 that V depends on of u x dV/du.
 module frb_torque
     use frb_free_flow, only: rigid_body
     use frb_kinds, only: wp
+    use frb_status, only: status_ok
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
+    use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
@@ -19,6 +24,7 @@ module frb_torque
     contains
         procedure(torque_on_body), deferred :: torque
         procedure :: potential => body_potential_unknown
+        procedure :: agree => body_alone
     end type body_scene
 
     !> The torques on n bodies that interact: each sees the attitudes of all. Centres are the scene's own
@@ -27,6 +33,7 @@ module frb_torque
     contains
         procedure(torques_on_group), deferred :: torques
         procedure :: potential => group_potential_unknown
+        procedure :: agree => group_alone
     end type group_scene
 
     !> Watches a run of one body.
@@ -49,45 +56,49 @@ module frb_torque
 
     abstract interface
         !> The torque at attitude q and time t.
-        pure subroutine torque_on_body(self, q, t, tau)
+        subroutine torque_on_body(self, q, t, tau, stat)
             import :: body_scene, wp
             implicit none
-            class(body_scene), intent(in) :: self
+            class(body_scene), intent(inout) :: self
             real(wp), intent(in) :: q(4)        !! attitude, unit quaternion, body to space
             real(wp), intent(in) :: t           !! time
             real(wp), intent(out) :: tau(3)     !! torque, body frame
+            integer, intent(out) :: stat        !! `status_ok`, or a code of any kind that ends the run
         end subroutine torque_on_body
 
         !> The torques at the attitudes q and time t.
-        pure subroutine torques_on_group(self, q, t, tau)
+        subroutine torques_on_group(self, q, t, tau, stat)
             import :: group_scene, wp
             implicit none
-            class(group_scene), intent(in) :: self
+            class(group_scene), intent(inout) :: self
             real(wp), contiguous, intent(in) :: q(:, :)     !! attitudes (4, n), unit quaternions
             real(wp), intent(in) :: t                       !! time
             real(wp), contiguous, intent(out) :: tau(:, :)  !! torques (3, n), each in its body's frame
+            integer, intent(out) :: stat                    !! `status_ok`, or a code that ends the run
         end subroutine torques_on_group
 
-        !> Called with the state after `step` steps, at time t; the run goes on unaffected.
-        subroutine observe_body(self, step, t, m, q)
-            import :: body_observer, wp
+        !> Called with the state after `step` steps, at time t.
+        subroutine observe_body(self, step, t, m, q, stop)
+            import :: body_observer, int64, wp
             implicit none
             class(body_observer), intent(inout) :: self
-            integer, intent(in) :: step         !! steps done, 0 at the start
+            integer(int64), intent(in) :: step  !! steps done, 0 at the start
             real(wp), intent(in) :: t           !! time
             real(wp), intent(in) :: m(3)        !! angular momentum, body frame
             real(wp), intent(in) :: q(4)        !! attitude
+            logical, intent(inout) :: stop      !! comes as .false.; .true. ends the run with this state
         end subroutine observe_body
 
-        !> Called with the state after `step` steps, at time t; the run goes on unaffected.
-        subroutine observe_group(self, step, t, m, q)
-            import :: group_observer, wp
+        !> Called with the state after `step` steps, at time t.
+        subroutine observe_group(self, step, t, m, q, stop)
+            import :: group_observer, int64, wp
             implicit none
             class(group_observer), intent(inout) :: self
-            integer, intent(in) :: step                     !! steps done, 0 at the start
+            integer(int64), intent(in) :: step              !! steps done, 0 at the start
             real(wp), intent(in) :: t                       !! time
             real(wp), contiguous, intent(in) :: m(:, :)     !! angular momenta (3, n), body frames
             real(wp), contiguous, intent(in) :: q(:, :)     !! attitudes (4, n)
+            logical, intent(inout) :: stop                  !! comes as .false.; .true. ends the run here
         end subroutine observe_group
 
         !> Moves the free body by h in time, in place.
@@ -105,27 +116,55 @@ module frb_torque
 
 contains
 
-    !> NaN: this scene gives no potential.
-    pure function body_potential_unknown(self, q, t) result(v)
-        class(body_scene), intent(in) :: self
+    !> The potential energy at attitude q and time t: v, and stat, `status_ok` or a code that says why there
+    !> is none. By default NaN: this scene gives no potential.
+    subroutine body_potential_unknown(self, q, t, v, stat)
+        class(body_scene), intent(inout) :: self
         real(wp), intent(in) :: q(4), t
-        real(wp) :: v
+        real(wp), intent(out) :: v
+        integer, intent(out) :: stat
 
         associate (unused_self => self, unused_q => q, unused_t => t)
         end associate
         v = ieee_value(v, ieee_quiet_nan)
-    end function body_potential_unknown
+        stat = status_ok
+    end subroutine body_potential_unknown
 
-    !> NaN: this scene gives no potential.
-    pure function group_potential_unknown(self, q, t) result(v)
-        class(group_scene), intent(in) :: self
+    !> The potential energy of all at the attitudes q (4, n) and time t, as for one body.
+    subroutine group_potential_unknown(self, q, t, v, stat)
+        class(group_scene), intent(inout) :: self
         real(wp), contiguous, intent(in) :: q(:, :)
         real(wp), intent(in) :: t
-        real(wp) :: v
+        real(wp), intent(out) :: v
+        integer, intent(out) :: stat
 
         associate (unused_self => self, unused_q => q, unused_t => t)
         end associate
         v = ieee_value(v, ieee_quiet_nan)
-    end function group_potential_unknown
+        stat = status_ok
+    end subroutine group_potential_unknown
+
+    !> The hook of runs on many processes. `integrate` calls it wherever it may have to end the run: once at
+    !> the start, after each torque, after a drift that closes a step, after each drift of the user's and
+    !> after each observer, with the code of this process, mostly `status_ok`; what comes back, it acts on. A
+    !> scene that shares its torques among processes overrides it with the largest code of all (MPI_Allreduce
+    !> with MPI_MAX), so that they end together, whichever of them refuses. Codes of its own are then best
+    !> positive; scheme, step, numbers of steps, observer and drift must be alike on all. By default nothing.
+    subroutine body_alone(self, code)
+        class(body_scene), intent(inout) :: self
+        integer, intent(inout) :: code
+
+        associate (unused_self => self, unused_code => code)
+        end associate
+    end subroutine body_alone
+
+    !> The same hook for a group.
+    subroutine group_alone(self, code)
+        class(group_scene), intent(inout) :: self
+        integer, intent(inout) :: code
+
+        associate (unused_self => self, unused_code => code)
+        end associate
+    end subroutine group_alone
 
 end module frb_torque
