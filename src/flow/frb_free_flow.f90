@@ -21,7 +21,7 @@
 !> Phases have no digits left when the angle turned in one step passes 2^53; the state is then on the right
 !> orbit, at an arbitrary phase.
 module frb_free_flow
-    use frb_flow_many, only: flow_many
+    use frb_flow_bodies, only: flow_many
     use frb_flow_one, only: flow_body
     use frb_inertia, only: body_core, core_from_moments, core_from_tensor
     use frb_kinds, only: wp

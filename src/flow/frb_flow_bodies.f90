@@ -1,5 +1,5 @@
 !> Many free bodies at once: blocks of them through SIMD lanes, blocks through threads.
-module frb_flow_many
+module frb_flow_bodies
     use frb_flow_block, only: flow_block
     use frb_flow_lanes, only: lanes, block_of_bodies
     use frb_flow_limits, only: plain_largest, plain_smallest
@@ -276,4 +276,4 @@ contains
 
     include 'plain_numbers.inc'
 
-end module frb_flow_many
+end module frb_flow_bodies
