@@ -1,7 +1,7 @@
 !> The run of n bodies that interact: see frb_splitting.
 module frb_splitting_many
     use frb_exact_updates, only: turn_state, kick_state
-    use frb_flow_many, only: flow_many
+    use frb_flow_bodies, only: flow_many
     use frb_free_flow, only: core_of, rigid_body
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
