@@ -1,11 +1,13 @@
 !> The one test program: every suite, then the closing line `N passed, N failed`.
-!> Exit code 1 when a check failed; `--fail` adds a check that must fail, to test the tests.
+!> Exit code 1 when a check failed; `--fail` adds a check that must fail, to test the tests; `--published`
+!> prints the table of data/published.dat instead.
 program check
     use, intrinsic :: iso_fortran_env, only: output_unit
     use frb_checks, only: tally
     use frb_test_base, only: test_base
     use frb_test_bodies, only: test_bodies
     use frb_test_free_motion, only: test_free_motion
+    use frb_test_published, only: test_published, print_published
     use frb_test_steps, only: test_steps
     use frb_test_ode45, only: test_ode45
     use frb_test_step_laws, only: test_step_laws
@@ -29,6 +31,11 @@ program check
     type(tally) :: t
     character(16) :: argument
 
+    call get_command_argument(1, argument)
+    if (argument == '--published') then
+        call print_published()
+        stop
+    end if
     call test_base(t)
     call test_bodies(t)
     call test_free_motion(t)
@@ -51,8 +58,8 @@ program check
     call test_flow_runs(t)
     call test_flow_batches(t)
     call test_flow_series(t)
+    call test_published(t)
 
-    call get_command_argument(1, argument)
     if (argument == '--fail') then
         call t%open_suite('self-test', 1)
         call t%ok('this-check-fails-on-purpose', .false.)

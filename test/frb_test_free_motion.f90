@@ -130,7 +130,7 @@ contains
                   all(abs(m - m0) <= tolerance*maxval(abs(m0))) .and. all(abs(change(2:4)) <= tolerance))
     end subroutine check_period
 
-    !> The precession is the way of the long axis round the momentum, followed from point to point of a period.
+    !> The precession is the way of the long axis round the momentum, followed from point to point.
     subroutine check_precession(t)
         type(tally), intent(inout) :: t
         type(free_motion) :: motion
