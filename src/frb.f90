@@ -4,7 +4,8 @@ module frb
     use frb_kinds, only: wp
     use frb_status, only: status_message, status_ok, status_bad_moments, status_bad_tensor, &
         status_bad_momentum, status_bad_attitude, status_bad_time, status_bad_count, status_bad_option, &
-        status_bad_torque, status_bad_scheme, status_no_period, status_lapack_failed, status_stopped
+        status_bad_torque, status_bad_scheme, status_no_period, status_lapack_failed, status_stopped, &
+        status_not_offered
     use frb_rotations, only: quat_product, quat_conjugate, quat_rotate, quat_to_matrix, matrix_to_quat
     use frb_inertia, only: principal_axes
     use frb_matrix_step, only: frb_step

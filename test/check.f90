@@ -16,6 +16,7 @@ program check
     use frb_test_carlson, only: test_carlson
     use frb_test_agm, only: test_agm
     use frb_test_schemes, only: test_schemes
+    use frb_test_modified_kicks, only: test_modified_kicks
     use frb_test_drifts, only: test_drifts
     use frb_test_splitting, only: test_splitting
     use frb_test_groups, only: test_groups
@@ -47,6 +48,7 @@ program check
     call test_carlson(t)
     call test_agm(t)
     call test_schemes(t)
+    call test_modified_kicks(t)
     call test_drifts(t)
     call test_splitting(t)
     call test_groups(t)

@@ -18,9 +18,10 @@ contains
     subroutine test_schemes(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('schemes', 89)
+        call t%open_suite('schemes', 166)
         call test_named(t)
         call test_conditions(t)
+        call test_modified(t)
         call test_own(t)
         call test_refused(t)
         call t%close_suite()
@@ -29,18 +30,19 @@ contains
     !> Every named scheme: what the table of frb_schemes says.
     subroutine test_named(t)
         type(tally), intent(inout) :: t
-        ! strang, yoshida4, srkn6, s6, srkn11, srkn14, aba864
-        integer, parameter :: stages(7) = [1, 3, 6, 6, 11, 14, 7]
-        integer, parameter :: orders(7) = [2, 4, 4, 4, 4, 4, 4]
-        integer, parameter :: nystroem_orders(7) = [2, 4, 4, 4, 6, 6, 4]
-        logical, parameter :: drift_first(7) = [.true., .true., .false., .true., .false., .true., .true.]
+        ! strang, yoshida4, srkn6, s6, srkn11, srkn14, srkn17, aba864, aba1064, fg4, fg6a, fg6b, fg8
+        integer, parameter :: stages(13) = [1, 3, 6, 6, 11, 14, 17, 7, 8, 4, 5, 5, 11]
+        integer, parameter :: orders(13) = [2, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4]
+        integer, parameter :: nystroem_orders(13) = [2, 4, 4, 4, 6, 6, 8, 4, 4, 4, 6, 6, 8]
+        logical, parameter :: drift_first(13) = [.true., .true., .false., .true., .false., .true., .false., &
+                                                 .true., .true., .false., .true., .false., .true.]
         type(splitting_scheme) :: scheme
         type(order_report) :: report
         character(:), allocatable :: name
         integer :: i
 
-        call t%equal('there-are-seven-named-schemes', size(scheme_names), 7)
-        do i = 1, 7
+        call t%equal('there-are-thirteen-named-schemes', size(scheme_names), 13)
+        do i = 1, 13
             name = trim(scheme_names(i))
             scheme = splitting_scheme(name)
             report = scheme%conditions()
@@ -62,6 +64,14 @@ contains
         scheme = splitting_scheme('aba864')
         report = scheme%conditions()
         call t%ok('aba864-has-orders-8-6-4-for-a-small-torque', all(report%kick_orders == [8, 6, 4]))
+        scheme = splitting_scheme('aba1064')
+        report = scheme%conditions()
+        call t%ok('aba1064-has-orders-10-6-4-for-a-small-torque', all(report%kick_orders == [10, 6, 4]))
+        do i = 1, 13
+            scheme = splitting_scheme(trim(scheme_names(i)))
+            call t%ok(trim(scheme_names(i))//'-has-modified-kicks-or-not', &
+                      scheme%has_modified_kicks() .eqv. i >= 10)
+        end do
         scheme = splitting_scheme('strang')
         call t%close_to('strang-is-half-a-drift-a-kick-half-a-drift', &
                         [scheme%drift_coefficients(), scheme%kick_coefficients()], &
@@ -122,6 +132,49 @@ contains
         report = misprint%conditions()
         call t%equal('an-error-in-the-ninth-digit-lowers-the-order', report%nystroem_order, 2)
     end subroutine test_conditions
+
+    !> The third letter: Takahashi and Imada's scheme, whose kick takes the leading error of kicks away.
+    subroutine test_modified(t)
+        type(tally), intent(inout) :: t
+        type(order_report) :: report
+        type(splitting_scheme) :: scheme, own
+        real(wp), allocatable :: a(:), b(:), c(:)
+        integer :: i
+
+        ! Chin's 4A: kick 1/6, drift 1/2, kick 2/3 with c = 1/72, drift 1/2, kick 1/6.
+        report = order_conditions([0.5_wp, 0.5_wp], [1/6.0_wp, 2/3.0_wp, 1/6.0_wp], drift_first=.false.)
+        call t%equal('chins-scheme-without-its-modified-kick-has-order-two', report%nystroem_order, 2)
+        report = order_conditions([0.5_wp, 0.5_wp], [1/6.0_wp, 2/3.0_wp, 1/6.0_wp], drift_first=.false., &
+                                  modified=[0.0_wp, 1/72.0_wp, 0.0_wp])
+        call t%equal('chins-scheme-has-order-four', report%nystroem_order, 4)
+        ! Strang, drift first, is exp(A + B - [A,[A,B]]/24 - [B,[A,B]]/12 + ...): c = 1/12 leaves the words
+        ! AAB - 2 ABA + BAA.
+        report = order_conditions([0.5_wp, 0.5_wp], [1.0_wp], drift_first=.true., modified=[1/12.0_wp])
+        call t%close_to('strang-with-a-modified-kick-misses-one-commutator', report%residuals(3), &
+                        sqrt(6.0_wp)/24, 4*eps)
+        do i = 10, 13
+            scheme = splitting_scheme(trim(scheme_names(i)))
+            a = scheme%drift_coefficients()
+            b = scheme%kick_coefficients()
+            c = scheme%modified_coefficients()
+            report = order_conditions(a, b, scheme%drift_first, modified=c*(1 + 1.0e-9_wp))
+            call t%equal(trim(scheme_names(i))//'-needs-its-modified-kicks-to-the-ninth-digit', &
+                         report%nystroem_order, 2)
+            own = splitting_scheme(a, b, c=c, displaced=1)
+            call t%ok(trim(scheme_names(i))//'-can-be-made-from-its-coefficients', own%status == status_ok &
+                      .and. all(abs(own%modified_coefficients() - c) <= 0.0_wp) .and. own%displaced == 1)
+        end do
+        own = splitting_scheme(a, b, c=c(2:))
+        call t%equal('fewer-modified-kicks-than-kicks-are-refused', own%status, status_bad_scheme)
+        c(1) = 2*c(1)
+        own = splitting_scheme(a, b, c=c)
+        call t%equal('unsymmetric-modified-kicks-are-refused', own%status, status_bad_scheme)
+        c = ieee_value(1.0_wp, ieee_quiet_nan)
+        own = splitting_scheme(a, b, c=c)
+        call t%equal('nan-in-modified-kicks-is-refused', own%status, status_bad_scheme)
+        scheme = splitting_scheme('fg6a', displaced=3)
+        call t%equal('three-displaced-torques-are-refused', scheme%status, status_bad_option)
+    end subroutine test_modified
 
     !> A user's own coefficients.
     subroutine test_own(t)

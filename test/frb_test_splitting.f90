@@ -12,7 +12,7 @@ module frb_test_splitting
     use frb_status, only: status_ok, status_bad_attitude, status_bad_count, status_bad_moments, &
         status_bad_momentum, status_bad_option, status_bad_scheme, status_bad_time, status_bad_torque
     use frb_torque_cases, only: top_case, known_top, distance, recorder, pulsed_torque, spoilt_torque, &
-        plain_drift, failing_drift, tilting_drift
+        fitted_change, plain_drift, failing_drift, tilting_drift
     use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_value, ieee_quiet_nan, ieee_positive_inf
     use, intrinsic :: iso_fortran_env, only: int64
     implicit none
@@ -27,7 +27,7 @@ contains
     subroutine test_splitting(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('splitting', 182)
+        call t%open_suite('splitting', 224)
         call test_values(t)
         call test_top_torque(t)
         call test_orders(t)
@@ -201,17 +201,6 @@ contains
                        maxval(abs(energy - energy(1))), 5.0e-14_wp)
         call t%at_most('compensated-energy-error-has-no-trend', abs(fitted_change(energy)), 4.0e-15_wp)
     end subroutine test_long_run
-
-    !> Change of the straight line of best fit over the last 900 of 1001 values.
-    pure function fitted_change(values) result(change)
-        real(wp), intent(in) :: values(1001)
-        real(wp) :: change
-        real(wp) :: place(900)
-        integer :: i
-
-        place = [(i - 450.5_wp, i=1, 900)]
-        change = 900*sum(place*values(102:1001))/sum(place**2)
-    end function fitted_change
 
     !> The torque of a heavy top is minus the change of its potential with a turn about each body axis.
     subroutine test_top_torque(t)

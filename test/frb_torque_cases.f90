@@ -11,8 +11,8 @@ module frb_torque_cases
     implicit none
     private
 
-    public :: top_case, known_top, distance, recorder, group_recorder, pulsed_torque, spoilt_torque, &
-        plain_drift, failing_drift, tilting_drift, dipoles, many_tops
+    public :: top_case, known_top, distance, fitted_change, recorder, group_recorder, pulsed_torque, &
+        spoilt_torque, plain_drift, failing_drift, tilting_drift, dipoles, many_tops
 
     !> A heavy top with its start and its end after the time t, to 25 digits (data/reference/make_tops.py).
     type :: top_case
@@ -135,6 +135,17 @@ contains
 
         d = sqrt(sum((m - m_ref)**2) + min(sum((q - q_ref)**2), sum((q + q_ref)**2)))
     end function distance
+
+    !> Change of the straight line of best fit over the last 900 of 1001 values.
+    pure function fitted_change(values) result(change)
+        real(wp), intent(in) :: values(1001)
+        real(wp) :: change
+        real(wp) :: place(900)
+        integer :: i
+
+        place = [(i - 450.5_wp, i=1, 900)]
+        change = 900*sum(place*values(102:1001))/sum(place**2)
+    end function fitted_change
 
     subroutine record(self, step, t, m, q, stop)
         class(recorder), intent(inout) :: self

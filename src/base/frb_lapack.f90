@@ -1,9 +1,9 @@
-!> Explicit interfaces of the two LAPACK routines the library calls.
+!> Explicit interfaces of the LAPACK routines the library calls.
 module frb_lapack
     implicit none
     private
 
-    public :: dsyev, dstev
+    public :: dsyev, dstev, dposv
 
     interface
         !> Eigenvalues (ascending) and eigenvectors of a real symmetric matrix.
@@ -27,6 +27,16 @@ module frb_lapack
             real(dp), intent(out) :: z(ldz, *), work(*)
             integer, intent(out) :: info
         end subroutine dstev
+
+        !> Solution of a system with a symmetric positive definite matrix, by Cholesky's decomposition.
+        pure subroutine dposv(uplo, n, nrhs, a, lda, b, ldb, info)
+            implicit none
+            integer, parameter :: dp = kind(1.0d0)
+            character, intent(in) :: uplo
+            integer, intent(in) :: n, nrhs, lda, ldb
+            real(dp), intent(inout) :: a(lda, *), b(ldb, *)
+            integer, intent(out) :: info
+        end subroutine dposv
     end interface
 
 end module frb_lapack

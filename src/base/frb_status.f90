@@ -12,7 +12,7 @@ module frb_status
     public :: conclude, status_message
     public :: status_ok, status_bad_moments, status_bad_tensor, status_bad_momentum, status_bad_attitude
     public :: status_bad_time, status_bad_count, status_bad_option, status_bad_torque, status_bad_scheme
-    public :: status_no_period, status_lapack_failed, status_stopped
+    public :: status_no_period, status_lapack_failed, status_stopped, status_not_offered
 
     integer, parameter :: status_ok = 0             !! done
     integer, parameter :: status_bad_moments = 1    !! moments not finite and positive, nor a linear rotor's
@@ -27,6 +27,7 @@ module frb_status
     integer, parameter :: status_no_period = 10     !! the motion has no period (a separatrix)
     integer, parameter :: status_lapack_failed = 11 !! an eigensolver of LAPACK did not converge
     integer, parameter :: status_stopped = 12       !! an observer ended the run
+    integer, parameter :: status_not_offered = 13   !! a scene does not tell this
 
 contains
 
@@ -75,6 +76,8 @@ contains
             message = 'the motion has no period'
         case (status_lapack_failed)
             message = 'the eigensolver of LAPACK did not converge'
+        case (status_not_offered)
+            message = 'the scene does not tell this'
         case (status_stopped)
             message = 'an observer ended the run'
         case default

@@ -6,6 +6,9 @@
 !> the difference of the lowest degree this is the same as the conditions on Lyndon words, without choosing a
 !> basis.
 !>
+!> A modified kick is exp(b B + c C) with C = [B,[A,B]] = 2 BAB - BBA - ABB, of three letters: for a body
+!> m += b h tau + c h^3 g, see frb_modified_kicks.
+!>
 !> With the Nystroem condition [B,[B,[B,A]]] = 0 only the part of the difference outside the two-sided ideal
 !> spanned by u (BBBA - 3 BBAB + 3 BABB - ABBB) v counts; it is found by orthogonal projection. The condition
 !> holds for every body under a torque that depends on the attitude (and time) only, because T is quadratic in
@@ -15,13 +18,14 @@
 !> 142 (2002) 313, section 2; near-integrable orders as in S. Blanes et al., Appl. Numer. Math. 68 (2013) 58.
 module frb_order_conditions
     use frb_kinds, only: wp
+    use frb_lapack, only: dposv
     implicit none
     private
 
     public :: order_report, order_conditions, longest_word
 
     !> Words up to this length are compared, so this is the highest order that can be told.
-    integer, parameter :: longest_word = 9
+    integer, parameter :: longest_word = 10
 
     !> What the order conditions say about a scheme. A residual is the Euclidean norm of the difference from
     !> exp(A + B) over a set of words.
@@ -40,28 +44,31 @@ module frb_order_conditions
 
 contains
 
-    !> The order of the product of exp(drifts(1) A), exp(kicks(1) B), exp(drifts(2) A) ..., or, unless
-    !> `drift_first`, of exp(kicks(1) B), exp(drifts(1) A) ...
+    !> The order of the product of exp(drifts(1) A), exp(kicks(1) B + modified(1) C), exp(drifts(2) A) ...,
+    !> or, unless `drift_first`, of exp(kicks(1) B + modified(1) C), exp(drifts(1) A) ...
     !> A condition counts as met when its residual is at most `tolerance`; the default stands well above the
     !> rounding of coefficients given to 14 digits and well below any condition missed.
-    pure function order_conditions(drifts, kicks, drift_first, tolerance) result(report)
+    pure function order_conditions(drifts, kicks, drift_first, tolerance, modified) result(report)
         real(wp), intent(in) :: drifts(:), kicks(:)     !! coefficients a and b in the order of use, finite
         logical, intent(in) :: drift_first              !! whether drifts(1) comes before kicks(1)
         real(wp), intent(in), optional :: tolerance     !! default 1e-12
+        real(wp), intent(in), optional :: modified(:)   !! coefficients c, one a kick; default 0
         type(order_report) :: report
-        real(wp) :: series(last_word), met
+        real(wp) :: series(last_word), c(size(kicks)), met
         real(wp) :: full(longest_word, 0:longest_word)  ! squared residual, by length and number of kicks
         real(wp) :: reduced(longest_word, 0:longest_word)
         integer :: length, count, word, most, i, k
 
         met = 1.0e-12_wp
         if (present(tolerance)) met = tolerance
+        c = 0.0_wp
+        if (present(modified)) c = modified
         series = 0.0_wp
         series(1) = 1.0_wp
         do i = 1, max(size(drifts), size(kicks))
-            if (drift_first .and. i <= size(drifts)) call append_flow(series, 0, drifts(i))
-            if (i <= size(kicks)) call append_flow(series, 1, kicks(i))
-            if (.not. drift_first .and. i <= size(drifts)) call append_flow(series, 0, drifts(i))
+            if (drift_first .and. i <= size(drifts)) call append_flow(series, drifts(i), 0.0_wp, 0.0_wp)
+            if (i <= size(kicks)) call append_flow(series, 0.0_wp, kicks(i), c(i))
+            if (.not. drift_first .and. i <= size(drifts)) call append_flow(series, drifts(i), 0.0_wp, 0.0_wp)
         end do
 
         full = 0.0_wp
@@ -101,90 +108,100 @@ contains
         end do
     end function leading
 
-    !> series <- series * exp(c X) with X = A (letter 0) or B (letter 1).
-    pure subroutine append_flow(series, letter, c)
+    !> series <- series * exp(a A + b B + c C), by its terms series * (...)^n/n!.
+    pure subroutine append_flow(series, a, b, c)
         real(wp), intent(inout) :: series(last_word)
-        integer, intent(in) :: letter
-        real(wp), intent(in) :: c
-        real(wp) :: factor
-        integer :: word, stem, power
+        real(wp), intent(in) :: a, b, c
+        real(wp) :: term(last_word)
+        integer :: word, n
 
-        ! Downwards: each word takes from shorter ones, which still have their old values.
-        do word = last_word, 2, -1
-            stem = word
-            factor = 1.0_wp
-            power = 0
-            do while (stem > 1 .and. iand(stem, 1) == letter)
-                stem = stem/2
-                power = power + 1
-                factor = factor*c/power
-                series(word) = series(word) + factor*series(stem)
+        term = series
+        do n = 1, longest_word
+            ! Downwards: each word takes from shorter ones, which still have their old values.
+            do word = last_word, 1, -1
+                term(word) = (merge(a, b, iand(word, 1) == 0)*at(word/2) + c*from_modified(word))/n
             end do
+            series = series + term
         end do
+
+    contains
+
+        !> The term's coefficient of a word; 0 for what is no word.
+        pure function at(shorter) result(value)
+            integer, intent(in) :: shorter
+            real(wp) :: value
+
+            value = 0.0_wp
+            if (shorter > 0) value = term(shorter)
+        end function at
+
+        !> What C = 2 BAB - BBA - ABB at the end of a word gives it.
+        pure function from_modified(longer) result(value)
+            integer, intent(in) :: longer
+            real(wp) :: value
+
+            select case (iand(longer, 7))
+            case (5)
+                value = 2*at(longer/8)
+            case (6, 3)
+                value = -at(longer/8)
+            case default
+                value = 0.0_wp
+            end select
+        end function from_modified
+
     end subroutine append_flow
 
     !> Squared distance of the part of `series` with `length` letters, `count` of them B, from the ideal of
     !> r = [B,[B,[B,A]]] = BBBA - 3 BBAB + 3 BABB - ABBB.
+    !>
+    !> A basis of the ideal: u r v for every word u BBBA v, BBBA being the first of its kind in the word. As
+    !> BBBA does not overlap with itself, these leading words tell the ideal (a Groebner basis of one).
     pure function outside_ideal(series, length, count) result(distance)
         real(wp), intent(in) :: series(last_word)
         integer, intent(in) :: length, count
         real(wp) :: distance
-        integer, parameter :: relation_letters(4) = [14, 13, 11, 7]   ! BBBA, BBAB, BABB, ABBB in binary
+        integer, parameter :: letters(4) = [14, 13, 11, 7]      ! BBBA, BBAB, BABB, ABBB in binary
         real(wp), parameter :: relation(4) = [1.0_wp, -3.0_wp, 3.0_wp, -1.0_wp]
-        real(wp), parameter :: dependent = 1.0e-10_wp   ! norms are 0 or not small
-        real(wp), allocatable :: basis(:, :), v(:)
-        real(wp) :: norm
-        integer :: place(2**length:2**(length + 1) - 1)
-        integer :: dimension, rank, word, left, right, after, i
+        real(wp) :: rest(2**length:2**(length + 1) - 1)
+        real(wp), allocatable :: products(:, :), matrix(:, :), along(:)
+        integer, allocatable :: words(:, :)                     ! of each element of the basis
+        integer :: rank, word, after, i, j, k, pass, info
 
-        dimension = 0
-        place = 0
+        allocate (words(4, 2**length))
+        rank = 0
+        rest = 0.0_wp
         do word = 2**length, 2**(length + 1) - 1
             if (popcnt(word) - 1 /= count) cycle
-            dimension = dimension + 1
-            place(word) = dimension
+            rest(word) = series(word)
+            do after = length - 4, 0, -1                        ! letters right of r
+                if (iand(ishft(word, -after), 15) /= letters(1)) cycle
+                rank = rank + 1
+                words(:, rank) = word + (letters - letters(1))*2**after
+                exit
+            end do
         end do
-
-        allocate (basis(dimension, dimension), v(dimension))
-        rank = 0
-        do after = 0, length - 4                               ! letters right of r
-            do left = 2**(length - 4 - after), 2**(length - 3 - after) - 1
-                do right = 0, 2**after - 1
-                    if (popcnt(left) - 1 + popcnt(right) /= count - 3) cycle
-                    v = 0.0_wp
-                    do i = 1, 4
-                        word = (left*16 + relation_letters(i))*2**after + right
-                        v(place(word)) = v(place(word)) + relation(i)
-                    end do
-                    call remove_span(basis, rank, v)
-                    norm = sqrt(sum(v**2))
-                    if (norm <= dependent) cycle
-                    rank = rank + 1
-                    basis(:, rank) = v/norm
+        allocate (products(rank, rank), matrix(rank, rank), along(rank))
+        do j = 1, rank
+            do i = 1, rank
+                products(i, j) = 0.0_wp
+                do k = 1, 4
+                    products(i, j) = products(i, j) + relation(k)*sum(relation, words(:, i) == words(k, j))
                 end do
             end do
         end do
-
-        do word = 2**length, 2**(length + 1) - 1
-            if (place(word) > 0) v(place(word)) = series(word)
-        end do
-        call remove_span(basis, rank, v)
-        distance = sum(v**2)
-    end function outside_ideal
-
-    !> Takes from v its part in the span of the first `rank` columns of an orthonormal basis; twice, so that
-    !> what is left is orthogonal to rounding.
-    pure subroutine remove_span(basis, rank, v)
-        real(wp), intent(in) :: basis(:, :)
-        integer, intent(in) :: rank
-        real(wp), intent(inout) :: v(:)
-        integer :: pass, i
-
+        ! Twice, so that what is left is orthogonal to rounding.
         do pass = 1, 2
-            do i = 1, rank
-                v = v - dot_product(basis(:, i), v)*basis(:, i)
+            do j = 1, rank
+                along(j) = sum(relation*rest(words(:, j)))
+            end do
+            matrix = products
+            if (rank > 0) call dposv('L', rank, 1, matrix, rank, along, rank, info)
+            do j = 1, rank
+                rest(words(:, j)) = rest(words(:, j)) - along(j)*relation
             end do
         end do
-    end subroutine remove_span
+        distance = sum(rest**2)
+    end function outside_ideal
 
 end module frb_order_conditions

@@ -1,7 +1,7 @@
 !> Scenes that come with the library: a heavy top, and a wrapper around a user's plain procedures.
 module frb_scenes
     use frb_kinds, only: wp
-    use frb_rotations, only: quat_rotate
+    use frb_rotations, only: cross, quat_rotate
     use frb_status, only: status_ok, status_bad_torque
     use frb_torque, only: body_scene
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
@@ -17,6 +17,7 @@ module frb_scenes
         real(wp) :: centre(3) = [0.0_wp, 0.0_wp, 1.0_wp]    !! point it acts at, in the body
     contains
         procedure :: torque => heavy_top_torque
+        procedure :: torque_change => heavy_top_torque_change
         procedure :: potential => heavy_top_potential
     end type heavy_top
 
@@ -57,25 +58,47 @@ contains
         real(wp), intent(in) :: q(4), t
         real(wp), intent(out) :: tau(3)
         integer, intent(out) :: stat
-
-        real(wp) :: f(3), u1, u2, u3, w1, w2, w3
+        real(wp) :: u1, u2, u3
 
         associate (unused_t => t)
         end associate
-        ! Written out in short chains of operations: a call of quat_rotate would cost more than that.
-        ! w = 2 f x q, u = f + q0 w + w x q.
-        f = 2*self%force
-        w1 = f(2)*q(4) - f(3)*q(3)
-        w2 = f(3)*q(2) - f(1)*q(4)
-        w3 = f(1)*q(3) - f(2)*q(2)
-        u1 = (self%force(1) + q(1)*w1) + (w2*q(4) - w3*q(3))
-        u2 = (self%force(2) + q(1)*w2) + (w3*q(2) - w1*q(4))
-        u3 = (self%force(3) + q(1)*w3) + (w1*q(3) - w2*q(2))
+        call force_in_body(self%force, q, u1, u2, u3)
         tau(1) = u2*self%centre(3) - u3*self%centre(2)
         tau(2) = u3*self%centre(1) - u1*self%centre(3)
         tau(3) = u1*self%centre(2) - u2*self%centre(1)
         stat = status_ok
     end subroutine heavy_top_torque
+
+    !> As u changes by u x n: (u x n) x centre.
+    pure subroutine heavy_top_torque_change(self, q, t, n, change, stat)
+        class(heavy_top), intent(inout) :: self
+        real(wp), intent(in) :: q(4), t, n(3)
+        real(wp), intent(out) :: change(3)
+        integer, intent(out) :: stat
+        real(wp) :: u1, u2, u3
+
+        associate (unused_t => t)
+        end associate
+        call force_in_body(self%force, q, u1, u2, u3)
+        change = cross(cross([u1, u2, u3], n), self%centre)
+        stat = status_ok
+    end subroutine heavy_top_torque_change
+
+    !> u = Q^T f. Written out in short chains of operations: a call of quat_rotate would cost more than that.
+    !> w = 2 f x q, u = f + q0 w + w x q.
+    pure subroutine force_in_body(force, q, u1, u2, u3)
+        real(wp), intent(in) :: force(3), q(4)
+        real(wp), intent(out) :: u1, u2, u3
+        real(wp) :: f(3), w1, w2, w3
+
+        f = 2*force
+        w1 = f(2)*q(4) - f(3)*q(3)
+        w2 = f(3)*q(2) - f(1)*q(4)
+        w3 = f(1)*q(3) - f(2)*q(2)
+        u1 = (force(1) + q(1)*w1) + (w2*q(4) - w3*q(3))
+        u2 = (force(2) + q(1)*w2) + (w3*q(2) - w1*q(4))
+        u3 = (force(3) + q(1)*w3) + (w1*q(3) - w2*q(2))
+    end subroutine force_in_body
 
     !> V = force . Q centre.
     pure subroutine heavy_top_potential(self, q, t, v, stat)

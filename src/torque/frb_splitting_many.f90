@@ -5,12 +5,13 @@ module frb_splitting_many
     use frb_free_flow, only: core_of, rigid_body
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
-    use frb_rotations, only: is_unit_quat
+    use frb_modified_kicks, only: angular_response, gradient_torque, turned
+    use frb_rotations, only: cross, is_unit_quat
     use frb_schemes, only: splitting_scheme
     use frb_splitting_plan, only: splitting_plan, check_run
     use frb_splitting_run, only: splitting_run, run_steps, largest_momentum
     use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_count, status_bad_momentum, &
-        status_bad_torque, status_stopped
+        status_bad_torque, status_not_offered, status_stopped
     use frb_torque, only: group_scene, group_observer, body_drift
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
     use, intrinsic :: iso_fortran_env, only: int64
@@ -25,6 +26,7 @@ module frb_splitting_many
         real(wp), allocatable :: m(:, :), q(:, :), tau(:, :)
         real(wp), allocatable :: m_rest(:, :), q_rest(:, :), m_new(:, :), turn(:, :)
         real(wp), allocatable :: kept_m(:, :), kept_q(:, :), kept_m_rest(:, :), kept_q_rest(:, :)
+        real(wp), allocatable :: n(:, :), g(:, :), other(:, :), q_turned(:, :)  ! see frb_modified_kicks
         type(body_core), allocatable :: core(:)
         type(rigid_body), pointer :: body(:) => null()          !! n, or one for all
         class(group_scene), pointer :: scene => null()
@@ -90,7 +92,10 @@ contains
             run%scene => scene
             if (present(observer)) run%observer => observer
             if (present(drift)) run%drift => drift
-            run%largest_torque = largest_momentum/max(1.0_wp, maxval(abs(plan%kick)))
+            run%on_request = scheme%displaced
+            if (scheme%has_modified_kicks()) then
+                allocate (run%n(3, n), run%g(3, n), run%other(3, n), run%q_turned(4, n), source=0.0_wp)
+            end if
             call run_steps(run, plan, h, nsteps, present(observer), spacing, time, code)
             m = run%m
             q = run%q
@@ -105,9 +110,9 @@ contains
         call conclude(code, 'integrate', stat)
     end subroutine integrate_group
 
-    subroutine stage_of_group(self, drift, time, kick, code)
+    subroutine stage_of_group(self, drift, time, kick, modified, code)
         class(group_run), intent(inout) :: self
-        real(wp), intent(in) :: drift, time, kick
+        real(wp), intent(in) :: drift, time, kick, modified
         integer, intent(out) :: code
         integer :: i, refused
 
@@ -128,17 +133,76 @@ contains
                            .and. all_below(self%m, largest_momentum))) code = status_bad_torque
             end if
             call self%scene%agree(code)
+            if (code == status_ok .and. abs(modified) > 0.0_wp) then
+                call add_gradients(self, time, kick, modified, code)
+                call self%scene%agree(code)
+            end if
             if (code /= status_ok) return
             self%torque_known = .true.
         end if
         if (self%compensated) then
             do i = 1, size(self%tau, 2)
                 call kick_state(kick, self%tau(:, i), self%m(:, i), self%m_rest(:, i))
+                if (abs(modified) > 0.0_wp) then
+                    call kick_state(modified, self%g(:, i), self%m(:, i), self%m_rest(:, i))
+                end if
             end do
         else
             self%m(:, :) = self%m + kick*self%tau
+            if (abs(modified) > 0.0_wp) self%m(:, :) = self%m + modified*self%g
         end if
     end subroutine stage_of_group
+
+    !> The torques g of a modified kick, as for one body: all bodies turn at a time.
+    subroutine add_gradients(self, time, kick, modified, code)
+        class(group_run), intent(inout) :: self
+        real(wp), intent(in) :: time, kick, modified
+        integer, intent(out) :: code
+        integer :: i, refused
+
+        do i = 1, size(self%tau, 2)
+            self%n(:, i) = angular_response(self%core(min(i, size(self%core))), self%tau(:, i))
+        end do
+        if (self%displaced == 0) then
+            call self%scene%torques_change(self%q, time, self%n, self%g, code)
+            if (code == status_not_offered) self%displaced = self%on_request
+        end if
+        if (self%displaced == 1) then
+            self%n(:, :) = (2*(modified/kick))*self%n
+            call turn_all(self, 1.0_wp)
+            call self%scene%torques(self%q_turned, time, self%other, code)
+        else if (self%displaced == 2) then
+            ! Both, whatever the first one says: others may take part in the torques.
+            call turn_all(self, self%reach)
+            call self%scene%torques(self%q_turned, time, self%g, code)
+            call turn_all(self, -self%reach)
+            call self%scene%torques(self%q_turned, time, self%other, refused)
+            if (code == status_ok) code = refused
+            if (code == status_ok) self%g(:, :) = (self%g - self%other)/(2*self%reach)
+        end if
+        if (code /= status_ok) return
+        do i = 1, size(self%tau, 2)
+            if (self%displaced == 1) then
+                self%tau(:, i) = self%other(:, i) + cross(self%n(:, i), self%tau(:, i))
+                self%g(:, i) = 0.0_wp
+            else
+                self%g(:, i) = gradient_torque(self%n(:, i), self%tau(:, i), self%g(:, i))
+            end if
+        end do
+        if (.not. (all_below(self%tau, self%largest_torque) &
+                   .and. all_below(self%g, self%largest_gradient))) code = status_bad_torque
+    end subroutine add_gradients
+
+    !> The attitudes turned by `reach` times n.
+    pure subroutine turn_all(self, reach)
+        class(group_run), intent(inout) :: self
+        real(wp), intent(in) :: reach
+        integer :: i
+
+        do i = 1, size(self%q, 2)
+            self%q_turned(:, i) = turned(self%q(:, i), reach*self%n(:, i))
+        end do
+    end subroutine turn_all
 
     !> Whether the sizes of the three numbers of each column add up to less than `bound`; a NaN or Inf shows
     !> in the sum, which is compared only when there is none.

@@ -5,12 +5,13 @@ module frb_splitting_one
     use frb_free_flow, only: core_of, rigid_body
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
-    use frb_rotations, only: is_unit_quat
+    use frb_modified_kicks, only: angular_response, gradient_torque, turned
+    use frb_rotations, only: cross, is_unit_quat
     use frb_schemes, only: splitting_scheme
     use frb_splitting_plan, only: splitting_plan, check_run
     use frb_splitting_run, only: splitting_run, run_steps, largest_momentum
     use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_momentum, status_bad_torque, &
-        status_stopped
+        status_not_offered, status_stopped
     use frb_torque, only: body_scene, body_observer, body_drift
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
     use, intrinsic :: iso_fortran_env, only: int64
@@ -26,6 +27,7 @@ module frb_splitting_one
         real(wp) :: m_rest(3) = 0.0_wp
         real(wp) :: q_rest(4) = 0.0_wp
         real(wp) :: tau(3) = 0.0_wp
+        real(wp) :: g(3) = 0.0_wp               ! see frb_modified_kicks
         real(wp) :: kept(14) = 0.0_wp
         type(body_core) :: core
         type(rigid_body), pointer :: body => null()
@@ -83,7 +85,7 @@ contains
             run%scene => scene
             if (present(observer)) run%observer => observer
             if (present(drift)) run%drift => drift
-            run%largest_torque = largest_momentum/max(1.0_wp, maxval(abs(plan%kick)))
+            run%on_request = scheme%displaced
             call run_steps(run, plan, h, nsteps, present(observer), spacing, time, code)
             m = run%m
             q = run%q
@@ -95,9 +97,9 @@ contains
         call conclude(code, 'integrate', stat)
     end subroutine integrate_body
 
-    subroutine stage_of_body(self, drift, time, kick, code)
+    subroutine stage_of_body(self, drift, time, kick, modified, code)
         class(body_run), intent(inout) :: self
-        real(wp), intent(in) :: drift, time, kick
+        real(wp), intent(in) :: drift, time, kick, modified
         integer, intent(out) :: code
         integer :: refused
 
@@ -118,15 +120,56 @@ contains
                            .and. all_below(self%m, largest_momentum))) code = status_bad_torque
             end if
             call self%scene%agree(code)
+            if (code == status_ok .and. abs(modified) > 0.0_wp) then
+                call add_gradient(self, time, kick, modified, code)
+                call self%scene%agree(code)
+            end if
             if (code /= status_ok) return
             self%torque_known = .true.
         end if
         if (self%compensated) then
             call kick_state(kick, self%tau, self%m, self%m_rest)
+            if (abs(modified) > 0.0_wp) call kick_state(modified, self%g, self%m, self%m_rest)
         else
             self%m = self%m + kick*self%tau
+            if (abs(modified) > 0.0_wp) self%m = self%m + modified*self%g
         end if
     end subroutine stage_of_body
+
+    !> The torque g of a modified kick, from the scene's own change of the torque or from displaced torques.
+    !> One displaced torque takes the place of the torque itself, and g is then 0.
+    subroutine add_gradient(self, time, kick, modified, code)
+        class(body_run), intent(inout) :: self
+        real(wp), intent(in) :: time, kick, modified
+        integer, intent(out) :: code
+        real(wp) :: n(3), change(3), other(3), turn(3)
+        integer :: refused
+
+        n = angular_response(self%core, self%tau)
+        if (self%displaced == 0) then
+            call self%scene%torque_change(self%q, time, n, change, code)
+            if (code == status_not_offered) self%displaced = self%on_request
+        end if
+        if (self%displaced == 1) then
+            turn = (2*(modified/kick))*n
+            call self%scene%torque(turned(self%q, turn), time, change, code)
+        else if (self%displaced == 2) then
+            ! Both, whatever the first one says: others may take part in the torques.
+            call self%scene%torque(turned(self%q, self%reach*n), time, change, code)
+            call self%scene%torque(turned(self%q, -self%reach*n), time, other, refused)
+            if (code == status_ok) code = refused
+            if (code == status_ok) change = (change - other)/(2*self%reach)
+        end if
+        if (code /= status_ok) return
+        if (self%displaced == 1) then
+            self%tau = change + cross(turn, self%tau)
+            self%g = 0.0_wp
+        else
+            self%g = gradient_torque(n, self%tau, change)
+        end if
+        if (.not. (all_below(self%tau, self%largest_torque) &
+                   .and. all_below(self%g, self%largest_gradient))) code = status_bad_torque
+    end subroutine add_gradient
 
     !> Whether the sizes of three numbers add up to less than `bound`; a NaN or Inf shows in the sum, which is
     !> compared only when there is none.

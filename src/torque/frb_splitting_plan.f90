@@ -31,12 +31,17 @@ module frb_splitting_plan
     !>
     !>     known = known .and. i == 1 .and. .not. abs(plan%drift(i)) > 0
     !>     if (.not. known) call my_forces(x, q, t + plan%time(i), f, tau);  known = .true.
+    !>
+    !> A scheme with modified kicks adds plan%modified(i)*g to m, g = 2 (D_n tau + n x tau) as in
+    !> frb_modified_kicks, and 2 D_n f to p; where anything else moves, D_n is the change with q turning by
+    !> n = I^-1 tau and x moving by f/mass together.
     type :: splitting_plan
         integer :: status = status_bad_scheme   !! `status_ok`, or why there is no plan; then no stages
         integer :: stages = 0                   !! kicks in a step
         real(wp), allocatable :: drift(:)       !! (stages + 1): time of each drift
         real(wp), allocatable :: kick(:)        !! (stages): what each torque is multiplied by
         real(wp), allocatable :: time(:)        !! (stages): of each torque, from the start of the step
+        real(wp), allocatable :: modified(:)    !! (stages): c h^3 of modified kicks, else 0
     end type splitting_plan
 
     interface splitting_plan
@@ -61,11 +66,12 @@ contains
         if (plan%status == status_ok) s = scheme%kicks
         plan%stages = s
         allocate (plan%drift(s + 1), source=0.0_wp)
-        allocate (plan%kick(s), plan%time(s), source=0.0_wp)
+        allocate (plan%kick(s), plan%time(s), plan%modified(s), source=0.0_wp)
         if (s == 0) return
         a = scheme%drift_coefficients()
         b = scheme%kick_coefficients()
         plan%kick(:) = b*h
+        if (scheme%has_modified_kicks()) plan%modified(:) = scheme%modified_coefficients()*h*h*h
         if (scheme%drift_first) then
             plan%drift(:) = a*h
             plan%time(:) = [(sum(a(1:i))*h, i=1, s)]

@@ -17,6 +17,10 @@ module frb_splitting_run
         logical :: compensated = .false.
         logical :: torque_known = .false.       !! nothing has moved since the last torque
         real(wp) :: largest_torque = 0.0_wp     !! of a torque whose kicks do not overflow
+        real(wp) :: largest_gradient = 0.0_wp   !! the same of g, see frb_modified_kicks
+        real(wp) :: reach = 0.0_wp              !! displaced torques: turn by this times n
+        integer :: displaced = 0                !! how many of them; 0: the scene tells the change
+        integer :: on_request = 2               !! how many if it does not
     contains
         procedure(one_stage), deferred :: stage
         procedure(one_drift), deferred :: move
@@ -26,13 +30,14 @@ module frb_splitting_run
     end type splitting_run
 
     abstract interface
-        !> Drift, torque at `time` unless it is known, kick. What the code says has been agreed on: one code
-        !> for all three, but a drift of the user's, which may leave no valid state behind, has its own.
-        subroutine one_stage(self, drift, time, kick, code)
+        !> Drift, torque at `time` unless it is known, kick, a modified one where `modified` is not 0. What
+        !> the code says has been agreed on: one code for all three; a drift of the user's, which may leave
+        !> no valid state behind, and a modified kick have their own.
+        subroutine one_stage(self, drift, time, kick, modified, code)
             import :: splitting_run, wp
             implicit none
             class(splitting_run), intent(inout) :: self
-            real(wp), intent(in) :: drift, time, kick
+            real(wp), intent(in) :: drift, time, kick, modified
             integer, intent(out) :: code
         end subroutine one_stage
 
@@ -83,6 +88,9 @@ contains
         s = plan%stages
         last_drift = plan%drift(s + 1)
         next_shown = huge(nsteps)
+        run%largest_torque = largest_momentum/max(1.0_wp, maxval(abs(plan%kick)))
+        run%largest_gradient = largest_momentum/max(1.0_wp, maxval(abs(plan%modified)))
+        run%reach = 0.25_wp*h*h
         code = status_ok
         if (watched) then
             next_shown = spacing
@@ -96,7 +104,7 @@ contains
                 time = t + plan%time(i)
                 ! Where no drift follows, the torque of the last stage is the next step's first.
                 if (i == s .and. .not. abs(last_drift) > 0.0_wp) time = t_next
-                call run%stage(plan%drift(i), time, plan%kick(i), code)
+                call run%stage(plan%drift(i), time, plan%kick(i), plan%modified(i), code)
                 if (code /= status_ok) exit
             end do
             if (code == status_ok .and. abs(last_drift) > 0.0_wp) call run%move(last_drift, code)

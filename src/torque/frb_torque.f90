@@ -10,7 +10,7 @@
 module frb_torque
     use frb_free_flow, only: rigid_body
     use frb_kinds, only: wp
-    use frb_status, only: status_ok
+    use frb_status, only: status_ok, status_not_offered
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
     use, intrinsic :: iso_fortran_env, only: int64
     implicit none
@@ -23,6 +23,7 @@ module frb_torque
     type, abstract :: body_scene
     contains
         procedure(torque_on_body), deferred :: torque
+        procedure :: torque_change => body_change_unknown
         procedure :: potential => body_potential_unknown
         procedure :: agree => body_alone
     end type body_scene
@@ -32,6 +33,7 @@ module frb_torque
     type, abstract :: group_scene
     contains
         procedure(torques_on_group), deferred :: torques
+        procedure :: torques_change => group_change_unknown
         procedure :: potential => group_potential_unknown
         procedure :: agree => group_alone
     end type group_scene
@@ -115,6 +117,37 @@ module frb_torque
     end interface
 
 contains
+
+    !> How the torque changes as the body turns: change = d/de tau(q exp(e n), t) at e = 0, body frame, for
+    !> schemes with a modified kick (frb_modified_kicks); stat, `status_ok` or a code that ends the run. By
+    !> default `status_not_offered`: the schemes then take displaced torques.
+    subroutine body_change_unknown(self, q, t, n, change, stat)
+        class(body_scene), intent(inout) :: self
+        real(wp), intent(in) :: q(4), t
+        real(wp), intent(in) :: n(3)            !! vector of the turn, body frame
+        real(wp), intent(out) :: change(3)
+        integer, intent(out) :: stat
+
+        associate (unused_self => self, unused_q => q, unused_t => t, unused_n => n)
+        end associate
+        change = 0.0_wp
+        stat = status_not_offered
+    end subroutine body_change_unknown
+
+    !> The same for a group, all bodies turning at a time: n and change are (3, n).
+    subroutine group_change_unknown(self, q, t, n, change, stat)
+        class(group_scene), intent(inout) :: self
+        real(wp), contiguous, intent(in) :: q(:, :)
+        real(wp), intent(in) :: t
+        real(wp), contiguous, intent(in) :: n(:, :)
+        real(wp), contiguous, intent(out) :: change(:, :)
+        integer, intent(out) :: stat
+
+        associate (unused_self => self, unused_q => q, unused_t => t, unused_n => n)
+        end associate
+        change = 0.0_wp
+        stat = status_not_offered
+    end subroutine group_change_unknown
 
     !> The potential energy at attitude q and time t: v, and stat, `status_ok` or a code that says why there
     !> is none. By default NaN: this scene gives no potential.
