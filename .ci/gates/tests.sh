@@ -1,0 +1,27 @@
+# How the tests are built, and that they can fail.
+
+strict="-O0 -g -std=f2008 -pedantic -Wall -Wextra -Werror -fcheck=all -ffpe-trap=invalid,zero,overflow -finit-real=snan -finit-derived"
+optimised="-O3 -Wall -Wextra -Werror"
+# Code for the machine at hand: fused operations, long vectors.
+native="-O3 -march=native -fno-math-errno -fno-trapping-math"
+recommended="$native -fno-tree-slp-vectorize -mprefer-vector-width=512"
+sanitized="-O1 -g -fsanitize=address,undefined -fno-omit-frame-pointer"
+
+# tests_built FLAGS: where the compiler takes these flags.
+tests_built() {
+    echo end | gfortran $1 -x f95 -c -o /dev/null - || skipped "the compiler refuses $1"
+    "$fpm" test --flag "$1"
+}
+
+# tests_by COMPILER FLAGS: by another release of the compiler.
+tests_by() {
+    apt_package "$1" "$1"
+    "$fpm" test --compiler "$1" --flag "$2"
+}
+
+builds_strictly() { "$fpm" build --no-prune --flag "$strict"; }
+
+failing_check_fails_the_tests() {
+    if "$fpm" test -- --fail >log 2>&1; then return 1; fi
+    grep -Eq '^[0-9]+ passed, 1 failed$' log
+}
