@@ -1,8 +1,15 @@
-!> The one test program: every suite, then the closing line `N passed, N failed`.
-!> Exit code 1 when a check failed; `--fail` adds a check that must fail, to test the tests; `--published`
-!> prints the table of data/published.dat instead.
+!> The one test program: every suite, or those that are named, then the closing line `N passed, N failed`.
+!>
+!>     fpm test                         all suites
+!>     fpm test -- flow-laws steps      these
+!>     fpm test -- --list               their names, none is run
+!>     fpm test -- --published          the table of data/published.dat
+!>
+!> Exit code 1 when a check failed or a name is not known. A run without its closing line has failed,
+!> whatever its exit code: something stopped in the suite whose name was written last. Two suites test the
+!> tests and run by name alone: a check fails in `--fail`, the library stops in `--stop`.
 program check
-    use, intrinsic :: iso_fortran_env, only: output_unit
+    use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
     use frb_checks, only: tally
     use frb_test_base, only: test_base
     use frb_test_bodies, only: test_bodies
@@ -28,46 +35,112 @@ program check
     use frb_test_flow_runs, only: test_flow_runs
     use frb_test_flow_batches, only: test_flow_batches
     use frb_test_flow_series, only: test_flow_series
+    use frb_test_status, only: test_status, stop_in_the_library
     implicit none
+
+    !> What is done with each suite: its name is looked for among the arguments, or written, or it runs.
+    integer, parameter :: looking = 1, listing = 2, running = 3
     type(tally) :: t
-    character(16) :: argument
+    logical, allocatable :: known(:)
+    integer :: i
 
-    call get_command_argument(1, argument)
-    if (argument == '--published') then
-        call print_published()
-        stop
-    end if
-    call test_base(t)
-    call test_bodies(t)
-    call test_free_motion(t)
-    call test_steps(t)
-    call test_ode45(t)
-    call test_step_laws(t)
-    call test_rivals(t)
-    call test_files(t)
-    call test_carlson(t)
-    call test_agm(t)
-    call test_schemes(t)
-    call test_modified_kicks(t)
-    call test_drifts(t)
-    call test_splitting(t)
-    call test_groups(t)
-    call test_legendre(t)
-    call test_quadrature(t)
-    call test_free_flow(t)
-    call test_flow_limits(t)
-    call test_flow_laws(t)
-    call test_flow_runs(t)
-    call test_flow_batches(t)
-    call test_flow_series(t)
-    call test_published(t)
-
-    if (argument == '--fail') then
-        call t%open_suite('self-test', 1)
-        call t%ok('this-check-fails-on-purpose', .false.)
-        call t%close_suite()
-    end if
+    allocate (known(command_argument_count()), source=.false.)
+    call suites(looking)
+    do i = 1, size(known)
+        select case (argument(i))
+        case ('--list')
+            call suites(listing)
+            stop
+        case ('--published')
+            call print_published()
+            stop
+        case default
+        end select
+        if (.not. known(i)) then
+            write (error_unit, '(a)') 'check: no such suite: '//trim(argument(i))//'; --list tells all'
+            flush (error_unit)
+            stop 1
+        end if
+    end do
+    call suites(running)
     if (t%skipped > 0) write (output_unit, '(i0,a)') t%skipped, ' skipped'
     write (output_unit, '(i0,a,i0,a)') t%passed, ' passed, ', t%failed, ' failed'
     if (t%failed > 0) error stop 1
+
+contains
+
+    !> Every suite, in the order in which they run.
+    subroutine suites(task)
+        integer, intent(in) :: task
+
+        call suite(task, 'base', test_base)
+        call suite(task, 'status', test_status)
+        call suite(task, 'bodies', test_bodies)
+        call suite(task, 'free-motion', test_free_motion)
+        call suite(task, 'steps', test_steps)
+        call suite(task, 'ode45', test_ode45)
+        call suite(task, 'step-laws', test_step_laws)
+        call suite(task, 'rivals', test_rivals)
+        call suite(task, 'files', test_files)
+        call suite(task, 'carlson', test_carlson)
+        call suite(task, 'agm', test_agm)
+        call suite(task, 'schemes', test_schemes)
+        call suite(task, 'modified-kicks', test_modified_kicks)
+        call suite(task, 'drifts', test_drifts)
+        call suite(task, 'splitting', test_splitting)
+        call suite(task, 'groups', test_groups)
+        call suite(task, 'legendre', test_legendre)
+        call suite(task, 'quadrature', test_quadrature)
+        call suite(task, 'free-flow', test_free_flow)
+        call suite(task, 'flow-limits', test_flow_limits)
+        call suite(task, 'flow-laws', test_flow_laws)
+        call suite(task, 'flow-runs', test_flow_runs)
+        call suite(task, 'flow-batches', test_flow_batches)
+        call suite(task, 'flow-series', test_flow_series)
+        call suite(task, 'published', test_published)
+        call suite(task, '--fail', fail)
+        call suite(task, '--stop', stop_in_the_library)
+    end subroutine suites
+
+    !> One suite. Without names among the arguments all run but those that test the tests.
+    subroutine suite(task, name, test)
+        integer, intent(in) :: task
+        character(*), intent(in) :: name
+        interface
+            subroutine test(t)
+                import :: tally
+                implicit none
+                type(tally), intent(inout) :: t
+            end subroutine test
+        end interface
+        logical :: named(size(known))
+        integer :: k
+
+        named = [(argument(k) == name, k=1, size(known))]
+        select case (task)
+        case (looking)
+            known = known .or. named
+        case (listing)
+            if (name(1:1) /= '-') write (output_unit, '(a)') name
+        case default
+            if (any(named) .or. (size(known) == 0 .and. name(1:1) /= '-')) call test(t)
+        end select
+    end subroutine suite
+
+    !> An argument of the program.
+    function argument(place) result(text)
+        integer, intent(in) :: place
+        character(32) :: text
+
+        call get_command_argument(place, text)
+    end function argument
+
+    subroutine fail(t)
+        type(tally), intent(inout) :: t
+
+        call t%open_suite('--fail', 1)
+        call t%ok('this-check-fails-on-purpose', .false.)
+        call t%close_suite()
+    end subroutine fail
+
 end program check

@@ -6,10 +6,17 @@
 module frb_checks
     use, intrinsic :: iso_fortran_env, only: output_unit
     use frb_kinds, only: wp
+    use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
     implicit none
     private
 
-    public :: tally
+    public :: tally, largest, worst_of
+
+    !> The larger of a score so far and a new one, or the largest of several new ones. NaN counts as huge: max
+    !> and maxval may pass it over.
+    interface worst_of
+        module procedure worst_of_two, worst_of_many
+    end interface worst_of
 
     type :: tally
         integer :: passed = 0
@@ -42,6 +49,8 @@ contains
         self%announced = checks
         self%at_opening = self%passed + self%failed + self%skipped
         write (output_unit, '(a,i0,a)') 'suite '//name//' (', checks, ')'
+        ! Should the suite stop, its name is the last that was said.
+        flush (output_unit)
     end subroutine open_suite
 
     !> Ends a suite; fails if it made another number of checks than announced.
@@ -133,5 +142,29 @@ contains
         call self%ok(name, got == expected)
         if (got /= expected) write (output_unit, '(a,i0,a,i0)') '    got ', got, ' expected ', expected
     end subroutine equal
+
+    elemental function worst_of_two(old, new) result(worst)
+        real(wp), intent(in) :: old, new
+        real(wp) :: worst
+
+        worst = huge(1.0_wp)
+        if (.not. (ieee_is_nan(old) .or. ieee_is_nan(new))) worst = max(old, new)
+    end function worst_of_two
+
+    pure function worst_of_many(old, new) result(worst)
+        real(wp), intent(in) :: old, new(:)
+        real(wp) :: worst
+
+        worst = worst_of_two(old, largest(new))
+    end function worst_of_many
+
+    !> The largest of the scores; NaN counts as huge, and so do no scores at all.
+    pure function largest(scores)
+        real(wp), intent(in) :: scores(:)
+        real(wp) :: largest
+
+        largest = huge(1.0_wp)
+        if (size(scores) > 0 .and. .not. any(ieee_is_nan(scores))) largest = maxval(scores)
+    end function largest
 
 end module frb_checks

@@ -2,6 +2,7 @@
 !> sensitivity: 1 is what rounding the inputs costs anyone.
 module frb_reference_cases
     use frb_kinds, only: wp, qp, unit_roundoff
+    use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
     implicit none
     private
 
@@ -62,14 +63,14 @@ contains
                      /(2*unit_roundoff + item%sens_q), wp)
     end function score_attitude
 
-    !> Median of the values (the upper of the two middle ones for an even count); NaN sorts as the largest.
+    !> Median of the values (the upper of the two middle ones for an even count); NaN counts as huge.
     pure function median(values) result(middle)
         real(wp), intent(in) :: values(:)
         real(wp) :: middle
         real(wp) :: sorted(size(values)), key
         integer :: i, j
 
-        sorted = values
+        sorted = merge(huge(1.0_wp), values, ieee_is_nan(values))
         do i = 2, size(sorted)
             key = sorted(i)
             j = i - 1

@@ -2,7 +2,7 @@
 !> of a batch do not depend on how it is split; a fuzz over bodies, momenta and steps of all sizes.
 module frb_test_flow_batches
     use, intrinsic :: iso_fortran_env, only: int64, output_unit
-    use frb_checks, only: tally
+    use frb_checks, only: tally, largest, worst_of
     use frb_flow_samples, only: stream, advanced, settled, defect, near_separatrix, no_turn, no_rotation
     use frb_free_flow, only: free_flow, rigid_body
     use frb_kinds, only: wp, unit_roundoff
@@ -234,7 +234,7 @@ contains
                 else
                     one = advanced(bodies(j)%moments(), m_in(:, j), h, q_in(:, j))
                     ! The angle turned is of size h.
-                    goes_on = goes_on .and. maxval(abs(settled([m(:, j), q(:, j)]) - one)) <= 16*eps*(1 + h)
+                    goes_on = goes_on .and. largest(abs(settled([m(:, j), q(:, j)]) - one)) <= 16*eps*(1 + h)
                 end if
             end do
         end subroutine compare
@@ -398,12 +398,12 @@ contains
             back = advanced(moments, there(1:3), -h, there(4:7))
             unit = sensitivity(moments, m, h) + sensitivity(moments, there(1:3), -h)
             if (unit < most_sensitive) then
-                orbit = max(orbit, bounded(defect(moments, m, there), moments, m))
+                orbit = worst_of(orbit, bounded(defect(moments, m, there), moments, m))
             else
-                sensitive = max(sensitive, maxval(bounded(defect(moments, m, there), moments, m)))
+                sensitive = worst_of(sensitive, bounded(defect(moments, m, there), moments, m))
             end if
-            if (unit < most_sensitive) error = max(error, norm3(back(1:3) - m)/norm3(m)/unit, &
-                                                   norm2(back(4:7) - no_turn)/unit)
+            if (unit < most_sensitive) error = worst_of(error, [norm3(back(1:3) - m)/norm3(m)/unit, &
+                                                   norm2(back(4:7) - no_turn)/unit])
         end do
         do i = 1, cases/width/4
             h = random%log_uniform(-8.0_wp, 5.0_wp)
@@ -417,11 +417,11 @@ contains
             do j = 1, width
                 there = settled([many_m(:, j), many_q(:, j)])
                 one = advanced(many_moments(:, j), many_m0(:, j), h)
-                sensitive = max(sensitive, maxval(bounded(defect(many_moments(:, j), many_m0(:, j), there), &
-                                                          many_moments(:, j), many_m0(:, j))))
+                sensitive = worst_of(sensitive, bounded(defect(many_moments(:, j), many_m0(:, j), there), &
+                                                    many_moments(:, j), many_m0(:, j)))
                 unit = sensitivity(many_moments(:, j), many_m0(:, j), h)
-                if (unit < most_sensitive) batch = max(batch, norm2(there(4:7) - one(4:7))/unit, &
-                                                       norm3(there(1:3) - one(1:3))/norm3(one(1:3))/unit)
+                if (unit < most_sensitive) batch = worst_of(batch, [norm2(there(4:7) - one(4:7))/unit, &
+                                                       norm3(there(1:3) - one(1:3))/norm3(one(1:3))/unit])
             end do
         end do
         call t%ok('fuzz-stays-finite', finite)

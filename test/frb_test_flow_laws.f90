@@ -1,7 +1,7 @@
 !> free_flow: the laws any flow of the free rigid body obeys, other names and other axes, agreement with the
 !> steps of the paper and with Taylor series, relative accuracy of small increments.
 module frb_test_flow_laws
-    use frb_checks, only: tally
+    use frb_checks, only: tally, largest, worst_of
     use frb_flow_limits, only: tiny_limit, short_limit, middle_limit, square_limit, period_limit, &
         tiny_turn_limit, small_turn_limit, middle_turn_limit
     use frb_flow_samples, only: stream, true_case, advanced, settled, near_separatrix, defect, no_turn
@@ -81,17 +81,18 @@ contains
                 whole = advanced(it%moments, it%m, it%h, it%q)
                 part = advanced(it%moments, it%m, 0.3_wp*it%h, it%q)
                 part = advanced(it%moments, part(1:3), it%h - 0.3_wp*it%h, part(4:7))
-                group = max(group, maxval(abs(part - whole)))
+                group = worst_of(group, [abs(part - whole)])
                 part = advanced(it%moments, whole(1:3), -it%h, whole(4:7))
-                back = max(back, maxval(abs(part - [it%m, it%q])))
+                back = worst_of(back, [abs(part - [it%m, it%q])])
                 do j = -3, 5
-                    orbit = max(orbit, defect(it%moments, it%m, advanced(it%moments, it%m, it%h*10.0_wp**j)))
+                    orbit = worst_of(orbit, defect(it%moments, it%m, &
+                                                   advanced(it%moments, it%m, it%h*10.0_wp**j)))
                 end do
                 if (mod(i, 20) /= 0) cycle
                 last = advanced(it%moments, it%m, -50.0_wp, it%q)
                 do j = -999, 1000
                     part = advanced(it%moments, it%m, 0.05_wp*j, it%q)
-                    jump = max(jump, maxval(abs(part(4:7) - last(4:7))))
+                    jump = worst_of(jump, [abs(part(4:7) - last(4:7))])
                     last = part
                 end do
             end associate
@@ -125,17 +126,17 @@ contains
                 do k = 2, 6
                     sense = merge(1.0_wp, -1.0_wp, k <= 3)
                     other = advanced(it%moments(orders(:, k)), sense*it%m(orders(:, k)), it%h)
-                    names = max(names, maxval(abs(other - [sense*state(orders(:, k)), state(4), &
-                                                           sense*state(4 + orders(:, k))])))
+                    names = worst_of(names, [abs(other - [sense*state(orders(:, k)), state(4), &
+                                                           sense*state(4 + orders(:, k))])])
                 end do
                 do k = 1, 3
                     sign3 = -1.0_wp
                     sign3(k) = 1.0_wp
                     other = advanced(it%moments, sign3*it%m, it%h)
-                    halves = max(halves, maxval(abs(other - [sign3*state(1:3), state(4), sign3*state(5:7)])))
+                    halves = worst_of(halves, [abs(other - [sign3*state(1:3), state(4), sign3*state(5:7)])])
                 end do
                 other = advanced(it%moments, -it%m, -it%h)
-                backwards = max(backwards, maxval(abs(other - [-state(1:3), state(4:7)])))
+                backwards = worst_of(backwards, [abs(other - [-state(1:3), state(4:7)])])
             end associate
         end do
         call t%at_most('relabelled-axes-give-the-relabelled-motion', names, same_step)
@@ -166,19 +167,19 @@ contains
                 state = advanced(it%moments, it%m, it%h, it%q)
                 m = it%m
                 call free_flow(body, it%h, m)
-                alone = max(alone, maxval(abs(settled(m) - state(1:3))))
+                alone = worst_of(alone, [abs(settled(m) - state(1:3))])
                 m = it%m
                 a = quat_to_matrix(it%q)
                 call free_flow(body, it%h, m, a)
-                matrix = max(matrix, maxval(abs(settled([a]) - [quat_to_matrix(state(4:7))])), &
-                             maxval(abs(settled(m) - state(1:3)))*huge(1))
+                matrix = worst_of(matrix, [abs(settled([a]) - [quat_to_matrix(state(4:7))]), &
+                             abs(settled(m) - state(1:3))*huge(1)])
                 m = it%m
                 a = matmul(shear, quat_to_matrix(it%q))
                 call free_flow(body, it%h, m, a)
-                sheared = max(sheared, maxval(abs(settled([a]) &
-                                                  - [matmul(shear, quat_to_matrix(state(4:7)))])))
-                norm = max(norm, maxval(abs(advanced(it%moments, it%m, it%h, 4*it%q) &
-                                            - [state(1:3), 4*state(4:7)])))
+                sheared = worst_of(sheared, [abs(settled([a]) &
+                                                  - [matmul(shear, quat_to_matrix(state(4:7)))])])
+                norm = worst_of(norm, [abs(advanced(it%moments, it%m, it%h, 4*it%q) &
+                                            - [state(1:3), 4*state(4:7)])])
                 if (mod(i, 6) /= 0) cycle
                 do j = 1, 45
                     associate (other => samples(1 + mod(i + 7*j, size(samples))))
@@ -195,13 +196,13 @@ contains
                 call free_flow(body, it%h, m2, q2)
                 call free_flow(bodies, it%h, m3)
                 call free_flow(bodies, it%h, m4, q4)
-                many_alone = max(many_alone, maxval(abs(settled([m1 - m2, m3 - m4]))))
+                many_alone = worst_of(many_alone, [abs(settled([m1 - m2, m3 - m4]))])
                 do j = 1, 45
                     associate (other => samples(1 + mod(i + 7*j, size(samples))))
-                        many = max(many, maxval(abs(settled([m2(:, j), q2(:, j)]) &
-                                                    - advanced(it%moments, other%m, it%h, other%q))), &
-                                   maxval(abs(settled([m4(:, j), q4(:, j)]) &
-                                              - advanced(other%moments, other%m, it%h, other%q))))
+                        many = worst_of(many, [abs(settled([m2(:, j), q2(:, j)]) &
+                                                    - advanced(it%moments, other%m, it%h, other%q)), &
+                                   abs(settled([m4(:, j), q4(:, j)]) &
+                                              - advanced(other%moments, other%m, it%h, other%q))])
                     end associate
                 end do
             end associate
@@ -240,12 +241,12 @@ contains
                 q = quat_product(it%q, quat_conjugate(other%q))
                 a = quat_to_matrix(q)
                 call free_flow(body, it%h, m, q)
-                worst(1) = max(worst(1), maxval(abs(settled(m) - matmul(r, p))))
-                worst(2) = max(worst(2), maxval(abs(settled(q) &
-                                                    - quat_product(p_q, quat_conjugate(other%q)))))
+                worst(1) = worst_of(worst(1), [abs(settled(m) - matmul(r, p))])
+                worst(2) = worst_of(worst(2), [abs(settled(q) &
+                                                    - quat_product(p_q, quat_conjugate(other%q)))])
                 m = matmul(r, it%m)
                 call free_flow(body, it%h, m, a)
-                worst(3) = max(worst(3), maxval(abs(settled([a]) - [quat_to_matrix(q)])))
+                worst(3) = worst_of(worst(3), [abs(settled([a]) - [quat_to_matrix(q)])])
             end associate
         end do
         call t%at_most('tensor-body-moves-as-its-principal-body: m', worst(1), two_steps)
@@ -267,13 +268,14 @@ contains
                 call free_flow(body, 0.01_wp, m, q)
                 call free_flow(plain, 0.01_wp, p, p_q)
             end do
-            worst(1) = maxval(abs(settled(m) - matmul(body%axes(), p)))
-            worst(2) = maxval(abs(settled(q) - quat_product(p_q, turn)))
+            worst(1) = largest(abs(settled(m) - matmul(body%axes(), p)))
+            worst(2) = largest(abs(settled(q) - quat_product(p_q, turn)))
             orbit = defect(body%moments(), it%m, settled([matmul(m, body%axes()), &
                                                           quat_product(q, matrix_to_quat(body%axes()))]))
         end associate
-        call t%at_most('tensor-body-over-long-runs-agrees-with-its-principal-body', maxval(worst(1:2)), phase)
-        call t%at_most('tensor-body-over-long-runs-stays-on-the-orbit', maxval(orbit), gathered)
+        call t%at_most('tensor-body-over-long-runs-agrees-with-its-principal-body', &
+                       largest(worst(1:2)), phase)
+        call t%at_most('tensor-body-over-long-runs-stays-on-the-orbit', largest(orbit), gathered)
     end subroutine check_tensor
 
     pure function diagonal(values) result(matrix)
@@ -298,10 +300,10 @@ contains
             associate (it => samples(i))
                 state = advanced(it%moments, it%m, it%h, it%q)
                 call quat_step(m, q, it%h, it%moments, it%m, it%q)
-                worst(1) = max(worst(1), maxval(abs(state - [m, q])))
+                worst(1) = worst_of(worst(1), [abs(state - [m, q])])
                 call frb_step(m, a, it%h, it%moments, it%m, quat_to_matrix(it%q))
-                worst(2) = max(worst(2), maxval(abs(state(1:3) - m)), &
-                               maxval(abs(quat_to_matrix(state(4:7)) - a)))
+                worst(2) = worst_of(worst(2), [abs(state(1:3) - m), &
+                               abs(quat_to_matrix(state(4:7)) - a)])
             end associate
         end do
         call t%at_most('quat-step-agrees', worst(1), two_steps)
@@ -369,7 +371,7 @@ contains
                 score_q(i) = score_attitude(it, state(4:7))
             end do
             call t%at_most('taylor-agrees: '//trim(names(kind)), &
-                           max(maxval(score_m(:count)), maxval(score_q(:count))), largest_score)
+                           largest([score_m(:count), score_q(:count)]), largest_score)
         end do
     end subroutine check_taylor
 
@@ -411,9 +413,9 @@ contains
                         call raise(small, moments, m0, h, zero, state)
                     else if (h*spin < 40) then
                         it = true_case(moments, m0, h)
-                        score = max(score, score_momentum(it, state(1:3, 1)), &
+                        score = worst_of(score, [score_momentum(it, state(1:3, 1)), &
                                     score_attitude(it, state(4:7, 1)), &
-                                    score_momentum(it, state(1:3, 2)), score_attitude(it, state(4:7, 2)))
+                                    score_momentum(it, state(1:3, 2)), score_attitude(it, state(4:7, 2))])
                     end if
                 end do
             end do
@@ -448,8 +450,8 @@ contains
         q = no_turn
         call taylor_flow(real(moments, qp), real(h, qp), m, q)
         do way = 1, 2
-            worst(1) = max(worst(1), real(norm2(state(5:7, way) - q(2:4))/norm2(q(2:4)), wp))
-            worst(2) = max(worst(2), real(abs(state(zero, way)/m(zero) - 1), wp))
+            worst(1) = worst_of(worst(1), real(norm2(state(5:7, way) - q(2:4))/norm2(q(2:4)), wp))
+            worst(2) = worst_of(worst(2), real(abs(state(zero, way)/m(zero) - 1), wp))
         end do
     end subroutine raise
 

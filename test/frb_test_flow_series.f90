@@ -2,7 +2,7 @@
 !> same terms as its recursion makes them, at arguments far beyond those it is used for. Rounding would hide a
 !> wrong last coefficient; this does not.
 module frb_test_flow_series
-    use frb_checks, only: tally
+    use frb_checks, only: tally, largest, worst_of
     use frb_double_flow_formulas, only: sin_cos
     use frb_flow_limits, only: sin_cos_limit
     use frb_kinds, only: rp => wp, has_quad
@@ -32,23 +32,26 @@ contains
         type(tally), intent(inout) :: t
         real(wp), parameter :: arguments(2, 4) = reshape([0.7_wp, 0.3_wp, 0.1_wp, 0.9_wp, 0.0_wp, 0.8_wp, &
                                                           0.6_wp, 0.6_wp], [2, 4])
-        real(wp) :: s_terms(0:most), y_terms(0:most), p, r, n, s, y, z, scd, c, d, error(9), sinc, cosm1
+        real(wp) :: s_terms(0:most), y_terms(0:most), p, r, n, s, y, z, scd, c, d, sinc, cosm1
+        real(rp) :: error(9)
         integer :: i, k
 
-        error = 0.0_wp
+        error = 0.0_rp
         do i = 1, 4
             p = arguments(1, i)
             r = arguments(2, i)
             n = 0.4_wp*i
             call square_series(p, r, y_terms)
             call middle_series(p + r, p*r, y, scd)
-            error(1) = max(error(1), abs(y - sum(y_terms(:8))), &
-                           abs(scd - sum([((k + 1)*y_terms(k), k=0, 9)])))
+            error(1) = worst_of(error(1), real(abs([y - sum(y_terms(:8)), &
+                                                      scd - sum([((k + 1)*y_terms(k), k=0, 9)])]), rp))
             call short_series(p + r, p*r, y, scd)
-            error(2) = max(error(2), abs(y - sum(y_terms(:5))))
-            error(3) = max(error(3), abs(scd - sum([((k + 1)*y_terms(k), k=0, 5)])))
-            error(4) = max(error(4), abs(middle_third_kind(p, r, n) - third_kind(p, r, n, 8)))
-            error(5) = max(error(5), abs(short_third_kind(p + r, p*r, n) - whole_third_kind(y_terms, n, 4)))
+            error(2) = worst_of(error(2), real(abs(y - sum(y_terms(:5))), rp))
+            error(3) = worst_of(error(3), real(abs(scd - sum([((k + 1)*y_terms(k), k=0, 5)])), rp))
+            error(4) = worst_of(error(4), real(abs(middle_third_kind(p, r, n) - third_kind(p, r, n, 8)), rp))
+            error(5) = worst_of(error(5), &
+                                real(abs(short_third_kind(p + r, p*r, n) &
+                                         - whole_third_kind(y_terms, n, 4)), rp))
             ! s at t = 1/16 from its series, to 1e-34, doubled twice in each way to t = 1/4.
             call triple_series(p/256, r/256, s_terms)
             s = sum(s_terms)/16
@@ -67,8 +70,8 @@ contains
             end do
             n = sqrt(y)/z
             call triple_series(p/16, r/16, s_terms)
-            error(6) = max(error(6), abs(s - sum(s_terms)/4), abs(n - sum(s_terms)/4), &
-                           abs(scd - n*(c/z)*(d/z)))
+            error(6) = worst_of(error(6), &
+                                real(abs([s - sum(s_terms)/4, n - sum(s_terms)/4, scd - n*(c/z)*(d/z)]), rp))
         end do
         error(9) = tiny_error()
         call small_turn(0.5_wp, sinc, cosm1)
@@ -80,7 +83,7 @@ contains
             s = s + p/(2*k + 1)*(-0.5_wp)**k
             p = p/((2*k + 1)*(2*k + 2))
         end do
-        error(7) = max(abs(sinc - s), abs(cosm1 - c))
+        error(7) = largest(real(abs([sinc - s, cosm1 - c]), rp))
         ! 1/sqrt(1 + x) - 1 to degree 7 by its binomial coefficients.
         s = 0.0_wp
         c = 1.0_wp
@@ -88,17 +91,17 @@ contains
             c = -c*(2*k - 1)/(2*k)*0.5_wp
             s = s + c
         end do
-        error(8) = abs(short_norm(0.5_wp) - s)
-        call t%at_most('s-squared-and-derivative-of-a-middle-step-are-their-series', real(error(1), rp), &
+        error(8) = real(abs(short_norm(0.5_wp) - s), rp)
+        call t%at_most('s-squared-and-derivative-of-a-middle-step-are-their-series', error(1), &
                        rounding)
-        call t%at_most('s-squared-of-a-short-step-is-its-series-to-degree-5', real(error(2), rp), rounding)
-        call t%at_most('derivative-of-s-squared-is-its-series-to-degree-5', real(error(3), rp), rounding)
-        call t%at_most('integral-of-a-middle-step-is-its-series-to-degree-8', real(error(4), rp), rounding)
-        call t%at_most('integral-of-a-short-step-is-its-series-to-degree-4', real(error(5), rp), rounding)
-        call t%at_most('doublings-of-the-triple-agree', real(error(6), rp), rounding)
-        call t%at_most('sine-and-cosine-of-a-small-turn-are-their-series', real(error(7), rp), rounding)
-        call t%at_most('norm-of-a-short-step-is-its-series', real(error(8), rp), rounding)
-        call t%at_most('first-terms-are-those-of-the-series', real(error(9), rp), rounding)
+        call t%at_most('s-squared-of-a-short-step-is-its-series-to-degree-5', error(2), rounding)
+        call t%at_most('derivative-of-s-squared-is-its-series-to-degree-5', error(3), rounding)
+        call t%at_most('integral-of-a-middle-step-is-its-series-to-degree-8', error(4), rounding)
+        call t%at_most('integral-of-a-short-step-is-its-series-to-degree-4', error(5), rounding)
+        call t%at_most('doublings-of-the-triple-agree', error(6), rounding)
+        call t%at_most('sine-and-cosine-of-a-small-turn-are-their-series', error(7), rounding)
+        call t%at_most('norm-of-a-short-step-is-its-series', error(8), rounding)
+        call t%at_most('first-terms-are-those-of-the-series', error(9), rounding)
     end subroutine check_coefficients
 
     !> Largest error of sin_cos over its range, the neighbours of multiples of pi/4 included.
@@ -115,23 +118,22 @@ contains
             if (modulo(i, 2) == 0) x = real(nint(x/quarter)*quarter, rp)
             if (abs(x) > sin_cos_limit) cycle
             call sin_cos(x, sine, cosine)
-            error = max(error, abs(real(sine - sin(real(x, wp)), rp)), &
-                        abs(real(cosine - cos(real(x, wp)), rp)))
+            error = worst_of(error, real(abs([sine - sin(real(x, wp)), cosine - cos(real(x, wp))]), rp))
         end do
     end function turn_error
 
     !> The first terms have those coefficients of the whole series that they take: at arguments so small that
     !> what they leave out is beyond quadruple precision.
     function tiny_error() result(error)
-        real(wp) :: error
+        real(rp) :: error
         real(wp), parameter :: p = 3.0e-9_wp, r = 5.0e-9_wp, smaller = 1.0e-3_wp
         real(wp) :: y(2), scd(2)
 
         call tiny_series(p + r, p*r, y(1), scd(1))
         call short_series(p + r, p*r, y(2), scd(2))
-        error = max(abs(y(1) - y(2)), abs(scd(1) - scd(2)), &
-                    abs(tiny_third_kind((p + r)*smaller, p*r*smaller**2, r*smaller) &
-                        - short_third_kind((p + r)*smaller, p*r*smaller**2, r*smaller)))
+        error = largest(real(abs([y(1) - y(2), scd(1) - scd(2), &
+                              tiny_third_kind((p + r)*smaller, p*r*smaller**2, r*smaller) &
+                              - short_third_kind((p + r)*smaller, p*r*smaller**2, r*smaller)]), rp))
     end function tiny_error
 
     !> Coefficients of s/t in t^2, at t = 1, from s'' = -(P + R) s + 2 P R s^3, s(0) = 0, s'(0) = 1.

@@ -1,6 +1,6 @@
 !> One motion at many times, its period and its precession.
 module frb_test_free_motion
-    use frb_checks, only: tally
+    use frb_checks, only: tally, worst_of
     use frb_free_flow, only: free_flow, rigid_body
     use frb_free_motion, only: free_motion
     use frb_kinds, only: wp, pi, two_pi
@@ -38,8 +38,8 @@ contains
         do i = 1, size(cases)
             motion = free_motion(rigid_body(cases(i)%moments), cases(i)%m0, unit)
             call motion%at(cases(i)%h, m, q)
-            worst_m = max(worst_m, score_momentum(cases(i), m))
-            worst_q = max(worst_q, score_attitude(cases(i), q))
+            worst_m = worst_of(worst_m, score_momentum(cases(i), m))
+            worst_q = worst_of(worst_q, score_attitude(cases(i), q))
         end do
         call t%at_most('momentum-at-any-time-is-within-4-units', worst_m, 4.0_wp)
         call t%at_most('attitude-at-any-time-is-within-4-units', worst_q, 4.0_wp)

@@ -1,7 +1,7 @@
 !> Schemes whose kicks take the change of the torque along: orders seen with the scene's own change and with
 !> displaced torques, one body and many, bodies by tensor, plans, long runs, refusals.
 module frb_test_modified_kicks
-    use frb_checks, only: tally
+    use frb_checks, only: tally, worst_of
     use frb_free_flow, only: free_flow, rigid_body
     use frb_invariants, only: total_energy
     use frb_kinds, only: wp
@@ -297,7 +297,7 @@ contains
                     energy(i) = total_energy(item%body, item%top, seen%t(i), seen%m(:, i), seen%q(:, i))
                 end do
                 v = energy - energy(1)
-                worst = max(worst, maxval(abs(v)))
+                worst = worst_of(worst, abs(v))
                 trend = trend + fitted_change(energy)/4
             end do
             call t%at_most(names(j)//'-energy-of-the-papers-top-stays-within-1e-13', worst, 1.0e-13_wp)

@@ -1,7 +1,7 @@
 !> The methods the charts compare with: each reaches its order, the truth its digits. All in quadruple
 !> precision, from the texts the chart program compiles in double precision.
 module frb_test_rivals
-    use frb_checks, only: tally
+    use frb_checks, only: tally, largest
     use frb_kinds, only: wp, has_quad
     use frb_quad_dmv, only: rk, dmv_body, new_dmv_body, dmv_steps
     use frb_quad_rotations, only: rotation_steps
@@ -82,7 +82,7 @@ contains
         m = start
         q = identity
         call taylor_flow(body, time, m, q)
-        call t%at_most(name, real(max(norm2(m - m_end), apart(q, q_end)), wp), tolerance_truth*10)
+        call t%at_most(name, largest(real([norm2(m - m_end), apart(q, q_end)], wp)), tolerance_truth*10)
     end subroutine end_values
 
     !> What a heavy top conserves, in body terms: energy with V = u3, and u . m with u = Q^T u0.
@@ -100,15 +100,16 @@ contains
         call t%at_most('top-conserves-momentum-along-the-force', &
                        real(abs(dot_product(u, m) - dot_product(u0, m0)), wp), tolerance_truth)
         call taylor_top(moments, u0, -10.0_rk, m, q)
-        call t%at_most('top-run-back-returns-to-its-start', real(max(norm2(m - m0), apart(q, identity)), &
-            wp), 10*tolerance_truth)
+        call t%at_most('top-run-back-returns-to-its-start', &
+                       largest(real([norm2(m - m0), apart(q, identity)], wp)), 10*tolerance_truth)
         m = m0
         q = identity
         m_free = m0
         q_free = identity
         call taylor_top(moments, 0*u0, 10.0_rk, m, q)
         call taylor_flow(moments, 10.0_rk, m_free, q_free)
-        call t%at_most('top-without-force-is-free', real(max(norm2(m - m_free), apart(q, q_free)), wp), &
+        call t%at_most('top-without-force-is-free', &
+                       largest(real([norm2(m - m_free), apart(q, q_free)], wp)), &
                        tolerance_truth)
         ! An axisymmetric top under the force along its axis also keeps the momentum about that axis.
         m = m0

@@ -1,6 +1,6 @@
 !> Splitting schemes: their orders by the order conditions, palindromes, refused coefficients.
 module frb_test_schemes
-    use frb_checks, only: tally
+    use frb_checks, only: tally, largest
     use frb_kinds, only: wp
     use frb_order_conditions, only: order_report, order_conditions
     use frb_schemes, only: splitting_scheme, scheme_names, mirrored, most_stages
@@ -57,7 +57,7 @@ contains
                             [1.0_wp, 1.0_wp], 4*eps)
             ! Published digits, and rounding: any misprint beyond the 14th digit shows.
             call t%at_most(name//'-meets-its-conditions-to-rounding', &
-                           maxval(report%nystroem_residuals(1:nystroem_orders(i))), 8*eps)
+                           largest(report%nystroem_residuals(1:nystroem_orders(i))), 8*eps)
             call t%ok(name//'-misses-the-next-conditions-clearly', &
                       report%nystroem_residuals(nystroem_orders(i) + 1) > 1.0e-8_wp)
         end do
@@ -234,13 +234,13 @@ contains
     end subroutine test_refused
 
     !> Largest residual of the conditions up to order six.
-    function residual(scheme) result(largest)
+    function residual(scheme)
         type(splitting_scheme), intent(in) :: scheme
-        real(wp) :: largest
+        real(wp) :: residual
         type(order_report) :: report
 
         report = scheme%conditions()
-        largest = maxval(report%nystroem_residuals(5:6))
+        residual = largest(report%nystroem_residuals(5:6))
     end function residual
 
     !> The elements of v from last to first.

@@ -1,7 +1,7 @@
 !> frb_step and quat_step: accuracy against references, special motions, extremes, refused input.
 module frb_test_steps
-    use frb_checks, only: tally
-    use frb_kinds, only: wp, unit_roundoff
+    use frb_checks, only: tally, largest, worst_of
+    use frb_kinds, only: wp
     use frb_matrix_step, only: frb_step
     use frb_quat_step, only: quat_step
     use frb_reference_cases, only: reference_case, read_cases, score_momentum, score_attitude, median
@@ -55,12 +55,12 @@ contains
             call frb_step(m, a, cases(i)%h, cases(i)%moments, cases(i)%m0, identity)
             score(i, 1) = score_momentum(cases(i), m)
             score(i, 2) = score_attitude(cases(i), matrix_to_quat(a))
-            defect = max(defect, maxval(abs(matmul(transpose(a), a) - identity)))
+            defect = worst_of(defect, [abs(matmul(transpose(a), a) - identity)])
             do frame = 1, 3
                 call quat_step(m, q, cases(i)%h, cases(i)%moments, cases(i)%m0, no_turn, frame=frame)
-                score(i, 1) = max(score(i, 1), score_momentum(cases(i), m))
+                score(i, 1) = worst_of(score(i, 1), score_momentum(cases(i), m))
                 score(i, 2 + frame) = score_attitude(cases(i), q)
-                defect = max(defect, abs(sqrt(sum(q**2)) - 1))
+                defect = worst_of(defect, abs(sqrt(sum(q**2)) - 1))
             end do
         end do
         call t%equal('all-reference-cases-are-read', size(cases), 325)
@@ -88,7 +88,7 @@ contains
 
         ! one check for both: the larger of median and maximum, each over its bound
         call t%at_most(name//'-is-within-its-units', &
-                       max(median(scores)/units(1), maxval(scores)/units(2)), 1.0_wp)
+                       largest([median(scores)/units(1), scores/units(2)]), 1.0_wp)
     end subroutine check_scores
 
     !> Published end values (30-digit Taylor series): free bodies of Hairer and Vilmart, tennis racket.
@@ -153,10 +153,9 @@ contains
             expected(1) = cos(h/moments(axis))      ! half the angle 2 h/I
             expected(1 + axis) = -sin(h/moments(axis))
             call frb_step(m, a, h, moments, e, identity)
-            errors(axis) = max(maxval(abs(q - expected)), maxval(abs(a - quat_to_matrix(expected))), &
-                               maxval(abs(m - e)))
+            errors(axis) = largest([abs(q - expected), abs(a - quat_to_matrix(expected)), abs(m - e)])
         end do
-        call t%at_most('axis-rotation-turns-about-its-axis', maxval(errors), 4*eps)
+        call t%at_most('axis-rotation-turns-about-its-axis', largest(errors), 4*eps)
 
         call frb_step(m, a, h, [2.0_wp, 3.0_wp, 6.0_wp], sqrt(0.5_wp)*[1.0_wp, 0.0_wp, 1.0_wp], identity)
         call t%close_to('separatrix-follows-tanh-and-sech', m, &
@@ -208,14 +207,14 @@ contains
                 if (frame == 0) then
                     call frb_step(m, a, h, bodies(:, body), m0, identity, np)
                     finite = finite .and. all(ieee_is_finite(a))
-                    defect = max(defect, maxval(abs(matmul(transpose(a), a) - identity)))
+                    defect = worst_of(defect, [abs(matmul(transpose(a), a) - identity)])
                 else
                     call quat_step(m, q, h, bodies(:, body), m0, no_turn, np, frame)
                     finite = finite .and. all(ieee_is_finite(q))
-                    defect = max(defect, abs(sqrt(sum(q**2)) - 1))
+                    defect = worst_of(defect, abs(sqrt(sum(q**2)) - 1))
                 end if
                 finite = finite .and. all(ieee_is_finite(m))
-                change = max(change, abs(norm3(m) - norm3(m0))/max(norm3(m0), 1.0e-308_wp))
+                change = worst_of(change, abs(norm3(m) - norm3(m0))/max(norm3(m0), 1.0e-308_wp))
             end do
         end do
         call t%ok('every-finite-input-gives-a-finite-result', finite)
@@ -302,7 +301,7 @@ contains
         call t%equal('quaternion-step-refuses-frame-4', stat, status_bad_option)
         call quat_step(m, q, 1.0_wp, i0, m0, no_turn, stat=stat)
         call t%equal('good-input-is-accepted', stat, status_ok)
-        call t%ok('step-moves', maxval(abs(m - m0)) > 1.0e-3_wp .and. unit_roundoff < eps)
+        call t%ok('step-moves', any(abs(m - m0) > 1.0e-3_wp))
     end subroutine check_refusals
 
 end module frb_test_steps

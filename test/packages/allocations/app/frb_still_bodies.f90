@@ -1,6 +1,7 @@
 !> A scene and an observer that allocate nothing.
 module frb_still_bodies
-    use frb, only: wp, group_observer, group_scene
+    use, intrinsic :: iso_fortran_env, only: int64
+    use frb, only: wp, group_observer, group_scene, status_ok
     implicit none
     private
 
@@ -18,19 +19,23 @@ module frb_still_bodies
 
 contains
 
-    pure subroutine torques(self, q, t, tau)
-        class(even_torques), intent(in) :: self
+    subroutine torques(self, q, t, tau, stat)
+        class(even_torques), intent(inout) :: self
         real(wp), contiguous, intent(in) :: q(:, :)
         real(wp), intent(in) :: t
         real(wp), contiguous, intent(out) :: tau(:, :)
+        integer, intent(out) :: stat
+
         tau = 0.01_wp
+        stat = status_ok
     end subroutine torques
 
-    subroutine observe(self, step, t, m, q)
+    subroutine observe(self, step, t, m, q, stop)
         class(onlooker), intent(inout) :: self
-        integer, intent(in) :: step
+        integer(int64), intent(in) :: step
         real(wp), intent(in) :: t
         real(wp), contiguous, intent(in) :: m(:, :), q(:, :)
+        logical, intent(inout) :: stop
     end subroutine observe
 
 end module frb_still_bodies
