@@ -185,5 +185,5 @@ refused() {
     "$@" >refused.stdout 2>refused.stderr || code=$?
     cat refused.stderr
     [ $code = 1 ] && [ "$(wc -l <refused.stderr)" = 1 ] && grep -q -- "$pattern" refused.stderr &&
-        [ ! -s refused.stdout ] && [ ! -e refused.out ] && [ ! -e refused.out.part ]
+        [ ! -s refused.stdout ] && [ ! -e refused.out ] && ! ls | grep -q '^frb-.*part$'
 }

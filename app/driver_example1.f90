@@ -5,7 +5,7 @@
 program driver_example1
     use frb, only: wp, body_drift, drift_by_name, heavy_top, integrate, mirrored, order_report, rigid_body, &
         scheme_names, splitting_scheme, status_message, status_ok
-    use frb_driver_command, only: begin_run, fail, fail_run, joined
+    use frb_driver_command, only: begin_run, fail, fail_run, joined, read_command, run_command
     use frb_driver_top, only: top_recorder
     use frb_init_files, only: init_values
     use frb_out_files, only: out_file
@@ -19,26 +19,30 @@ program driver_example1
     type(splitting_scheme) :: scheme
     type(order_report) :: report
     class(body_drift), allocatable :: drift
-    character(:), allocatable :: error, scheme_name, drift_name
+    type(run_command) :: command
     character(160) :: title
     real(wp) :: m(3), q(4)
     integer :: stat
 
-    call begin_run(1, start, out, scheme_name, drift_name)
-    if (len(scheme_name) > 0) then
-        scheme = splitting_scheme(scheme_name)
-    else
-        scheme_name = 'of the file'
-        scheme = splitting_scheme(mirrored(start%a, 15), mirrored(start%b, 14), tolerance=digits_of_files)
+    ! Names are checked before any file is opened.
+    call read_command(1, command)
+    if (len(command%scheme) > 0) then
+        scheme = splitting_scheme(command%scheme)
+        if (scheme%status /= status_ok) then
+            call fail('unknown scheme '//command%scheme//'; known are '//joined(scheme_names))
+        end if
     end if
-    if (scheme%status /= status_ok) then
-        call fail_run(out, 'unknown scheme '//scheme_name//'; known are '//joined(scheme_names))
-    end if
-    if (len(drift_name) == 0) drift_name = 'free_flow'
-    call drift_by_name(drift_name, drift, stat)
+    if (len(command%drift) == 0) command%drift = 'free_flow'
+    call drift_by_name(command%drift, drift, stat)
     if (stat /= status_ok) then
-        call fail_run(out, 'unknown drift '//drift_name//'; known are free_flow, frb_step, quat_step, and'// &
-                      ' frb_step:N, quat_step:N with N Gauss points')
+        call fail('unknown drift '//command%drift//'; known are free_flow, frb_step, quat_step, and'// &
+                  ' frb_step:N, quat_step:N with N Gauss points')
+    end if
+    call begin_run(1, command, start, out)
+    if (len(command%scheme) == 0) then
+        command%scheme = 'of the file'
+        scheme = splitting_scheme(mirrored(start%a, 15), mirrored(start%b, 14), tolerance=digits_of_files)
+        if (scheme%status /= status_ok) call fail_run(out, 'the scheme: '//status_message(scheme%status))
     end if
 
     ! q counts from the attitude Q0 of the file, so that Q = Q0 E(q) and u = Q^T u0 = E(q)^T (Q0^T u0).
@@ -51,11 +55,9 @@ program driver_example1
     call integrate(rigid_body(start%moments), scheme, top, start%h, start%steps, m, q, recorder, &
                    drift=drift, compensated=.true., stat=stat)
     if (stat /= status_ok) call fail_run(recorder%out, 'integrate: '//status_message(stat))
-    call recorder%out%commit(error)
-    if (allocated(error)) call fail(error)
     report = scheme%conditions()
-    write (title, '(a,i0,a,i0,a)') 'driver_example1: heavy top, scheme '//scheme_name//' (', &
-        scheme%stages(), ' stages, order ', report%nystroem_order, '), drift '//drift_name
-    call recorder%watch%report(trim(title), start%h, recorder%out)
+    write (title, '(a,i0,a,i0,a)') 'driver_example1: heavy top, scheme '//command%scheme//' (', &
+        scheme%stages(), ' stages, order ', report%nystroem_order, '), drift '//command%drift
+    call recorder%watch%finish(trim(title), start%h, recorder%out)
 
 end program driver_example1

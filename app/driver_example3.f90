@@ -1,44 +1,8 @@
-!> Example 3 of the paper: a free rigid body in N steps, attitude a matrix, by `frb_step`.
-!> Exact or with np Gauss points; writes records of m(3), Q(9), t after every step.
+!> Example 3 of the paper: a free rigid body, N steps, attitude a matrix, exact or with np Gauss points.
 program driver_example3
-    use frb, only: wp, frb_step, status_ok, status_message
-    use frb_driver_command, only: begin_run, fail, fail_run
-    use frb_driver_watch, only: run_watch
-    use frb_init_files, only: init_values
-    use frb_out_files, only: out_file
+    use frb_driver_free, only: run_free_body
     implicit none
-    type(init_values) :: start
-    type(out_file) :: out
-    type(run_watch) :: watch
-    character(:), allocatable :: error
-    real(wp) :: m(3), attitude(3, 3)
-    integer :: i, stat
 
-    call begin_run(3, start, out)
-    m = start%m
-    attitude = start%attitude
-    call watch%begin(start%steps)
-    call record(0)
-    do i = 1, start%steps
-        call watch%begin_step()
-        call frb_step(m, attitude, start%h, start%moments, m, attitude, np=start%points, stat=stat)
-        call watch%end_step()
-        if (stat /= status_ok) call fail_run(out, 'frb_step: '//status_message(stat))
-        call record(i)
-    end do
-    call out%commit(error)
-    if (allocated(error)) call fail(error)
-    call watch%report('driver_example3: free rigid body, matrix', start%h, out)
-
-contains
-
-    !> Notes and writes the state after step i.
-    subroutine record(i)
-        integer, intent(in) :: i
-
-        call watch%note(m, attitude, start%moments)
-        call out%write_record([m, reshape(attitude, [9]), (real(i, wp)/start%steps)*start%t_final], error)
-        if (allocated(error)) call fail_run(out, error)
-    end subroutine record
+    call run_free_body(3)
 
 end program driver_example3

@@ -20,6 +20,8 @@ program check
     use frb_test_step_laws, only: test_step_laws
     use frb_test_rivals, only: test_rivals
     use frb_test_files, only: test_files
+    use frb_test_files_list, only: test_files_list
+    use frb_test_files_out, only: test_files_out
     use frb_test_carlson, only: test_carlson
     use frb_test_agm, only: test_agm
     use frb_test_schemes, only: test_schemes
@@ -82,6 +84,8 @@ contains
         call suite(task, 'step-laws', test_step_laws)
         call suite(task, 'rivals', test_rivals)
         call suite(task, 'files', test_files)
+        call suite(task, 'files-list', test_files_list)
+        call suite(task, 'files-out', test_files_out)
         call suite(task, 'carlson', test_carlson)
         call suite(task, 'agm', test_agm)
         call suite(task, 'schemes', test_schemes)

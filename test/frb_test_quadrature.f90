@@ -2,9 +2,12 @@
 module frb_test_quadrature
     use frb_checks, only: tally, worst_of
     use frb_elliptic_table, only: table_entry, read_table, columns_of
-    use frb_kinds, only: wp, pi
+    use frb_kinds, only: wp, pi, most_points
     use frb_legendre, only: ellint_pi
+    use frb_matrix_step, only: frb_step
     use frb_quadrature, only: gauss_legendre, eint_gauss
+    use frb_quat_step, only: quat_step
+    use frb_rotations, only: quat_to_matrix
     use frb_status, only: status_ok, status_bad_count
     use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_value, ieee_quiet_nan
     implicit none
@@ -22,7 +25,7 @@ contains
     subroutine test_quadrature(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('quadrature', 16)
+        call t%open_suite('quadrature', 19)
         call rules(t)
         call integrals(t)
         call refusals(t)
@@ -118,6 +121,7 @@ contains
                   .and. stat_sum == status_bad_count)
         value = eint_gauss(0.0_wp, 1.0_wp, 0.5_wp, 0.5_wp, 12, stat=stat_sum)
         call t%equal('accepted-points-set-ok', stat_sum, status_ok)
+        call too_many_points(t)
         call t%ok('outside-the-domain-gives-nan', &
                   all(ieee_is_nan([eint_gauss(0.0_wp, 3.0_wp, 2.0_wp, 0.5_wp, 5), &
                                    eint_gauss(0.0_wp, 1.0_wp, 0.5_wp, 1.5_wp, 5), &
@@ -125,6 +129,29 @@ contains
                                    eint_gauss(0.0_wp, 1.0_wp, nan, 0.5_wp, 5), &
                                    eint_gauss(0.0_wp, 1.0_wp, 0.5_wp, 0.5_wp, 5, kc2=-1.0_wp)])))
     end subroutine refusals
+
+    !> The largest number of points is accepted by every routine that takes one, the next one and the largest
+    !> integer are refused.
+    subroutine too_many_points(t)
+        type(tally), intent(inout) :: t
+        integer, parameter :: counts(3) = [most_points, most_points + 1, huge(1)]
+        real(wp), parameter :: moments(3) = [1.0_wp, 2.0_wp, 3.0_wp]
+        real(wp) :: nodes(most_points + 1), weights(most_points + 1), value, m(3), q(4), attitude(3, 3)
+        integer :: stat(4, 3), i
+
+        do i = 1, 3
+            m = [0.1_wp, 1.0_wp, 0.2_wp]
+            q = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+            attitude = quat_to_matrix(q)
+            value = eint_gauss(0.0_wp, 1.0_wp, 0.5_wp, 0.5_wp, counts(i), stat=stat(1, i))
+            call gauss_legendre(counts(i), nodes, weights, stat(2, i))
+            call frb_step(m, attitude, 0.1_wp, moments, m, attitude, np=counts(i), stat=stat(3, i))
+            call quat_step(m, q, 0.1_wp, moments, m, q, np=counts(i), stat=stat(4, i))
+        end do
+        call t%ok('most-points-are-accepted', all(stat(:, 1) == status_ok))
+        call t%ok('more-than-most-points-are-refused', all(stat(:, 2:) == status_bad_count))
+        call t%ok('integral-with-too-many-points-is-nan', ieee_is_nan(value))
+    end subroutine too_many_points
 
     !> The rule with np points in arrays of its size.
     subroutine rule(np, nodes, weights)

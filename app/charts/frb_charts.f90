@@ -13,18 +13,10 @@ program frb_charts
     use frb_chart_torque, only: chart_torque
     use frb_chart_triangle, only: chart_triangle
     use frb_kinds, only: has_quad
+    use frb_system, only: c_exit
     use, intrinsic :: iso_c_binding, only: c_int
     use, intrinsic :: iso_fortran_env, only: error_unit
     implicit none
-
-    interface
-        !> C: ends the program with an exit code and, unlike `error stop`, without a word.
-        subroutine c_exit(code) bind(c, name='exit')
-            import :: c_int
-            implicit none
-            integer(c_int), value :: code
-        end subroutine c_exit
-    end interface
 
     character(*), parameter :: names(*) = [character(16) :: 'speed', 'scenes', 'cost', 'work-precision', &
         'heavy-top', 'torque', 'failure', 'growth', 'triangle', 'scale', 'orbits', 'agreement']

@@ -6,13 +6,21 @@ module frb_driver_command
     use frb, only: scheme_names
     use frb_init_files, only: init_values, read_init_file
     use frb_out_files, only: out_file
+    use frb_system, only: c_exit, c_signal
     use frb_version, only: version
-    use, intrinsic :: iso_c_binding, only: c_int
-    use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
+    use, intrinsic :: iso_c_binding, only: c_int, c_intptr_t
+    use, intrinsic :: iso_fortran_env, only: error_unit
     implicit none
     private
 
-    public :: begin_run, fail, fail_run, joined
+    public :: run_command, read_command, begin_run, fail, fail_run, joined
+
+    !> What the command line says.
+    type :: run_command
+        character(:), allocatable :: init_path, out_path
+        character(:), allocatable :: scheme     !! its name, '' if none is given
+        character(:), allocatable :: drift      !! its name, '' if none is given
+    end type run_command
 
     !> What each program computes, and what a record of its output holds.
     character(*), parameter :: purposes(0:4) = [character(80) :: &
@@ -28,33 +36,24 @@ module frb_driver_command
         'm(3), Q(9) column by column, t; at the start and after every step', &
         'm(3), q(4) scalar first, t; at the start and after every step']
 
-    interface
-        !> C: ends the program with an exit code and, unlike `stop`, without a word.
-        subroutine c_exit(code) bind(c, name='exit')
-            import :: c_int
-            implicit none
-            integer(c_int), value :: code
-        end subroutine c_exit
-    end interface
-
 contains
 
-    !> Reads the command line and the init file, and opens the output. Comes back only if a run is to be made.
-    subroutine begin_run(example, values, out, scheme, drift)
+    !> Reads the init file, then opens the output. Comes back only if a run is to be made.
+    subroutine begin_run(example, command, values, out)
         integer, intent(in) :: example              !! 0 to 4
+        type(run_command), intent(in) :: command
         type(init_values), intent(out) :: values
-        type(out_file), intent(inout) :: out
-        character(:), allocatable, intent(out), optional :: scheme  !! name of a scheme, '' if none is given
-        character(:), allocatable, intent(out), optional :: drift   !! name of a drift, '' if none is given
-        character(:), allocatable :: init_path, out_path, scheme_name, drift_name, error
+        type(out_file), intent(out) :: out
+        ! A file that grows beyond the limit of the shell is an error of writing, not the end of the program.
+        integer(c_int), parameter :: file_too_large = 25
+        integer(c_intptr_t), parameter :: ignore = 1
+        character(:), allocatable :: error
+        integer(c_intptr_t) :: before
 
-        call read_command_line(example, init_path, out_path, scheme_name, drift_name)
-        if (present(scheme)) scheme = scheme_name
-        if (present(drift)) drift = drift_name
-        if (init_path == out_path) call fail(init_path//': is the input, it cannot be the output too')
-        call read_init_file(init_path, example, values, error)
+        before = c_signal(file_too_large, ignore)
+        call read_init_file(command%init_path, example, values, error, command%out_path)
         if (allocated(error)) call fail(error)
-        call out%open_for_writing(out_path, error)
+        call out%open_for_writing(command%out_path, error)
         if (allocated(error)) call fail(error)
     end subroutine begin_run
 
@@ -62,7 +61,9 @@ contains
     subroutine fail(message)
         character(*), intent(in) :: message
 
-        call finish(error_unit, 'error: '//message, 1)
+        write (error_unit, '(a)') 'error: '//message
+        flush (error_unit)
+        call c_exit(1_c_int)
     end subroutine fail
 
     !> Ends a run that cannot go on, and removes what it wrote.
@@ -74,10 +75,10 @@ contains
         call fail(message)
     end subroutine fail_run
 
-    !> Paths of the init file and of the output, from the arguments or by default, and names, '' by default.
-    subroutine read_command_line(example, init_path, out_path, scheme, drift)
-        integer, intent(in) :: example
-        character(:), allocatable, intent(out) :: init_path, out_path, scheme, drift
+    !> The command line, with defaults where it says nothing.
+    subroutine read_command(example, command)
+        integer, intent(in) :: example              !! 0 to 4
+        type(run_command), intent(out) :: command
         character(:), allocatable :: word
         character :: digit
         logical :: options
@@ -85,10 +86,7 @@ contains
 
         digit = achar(iachar('0') + example)
         options = .true.
-        init_path = ''
-        out_path = ''
-        scheme = ''
-        drift = ''
+        command = run_command('', '', '', '')
         i = 0
         do while (i < command_argument_count())
             i = i + 1
@@ -96,28 +94,28 @@ contains
             if (options .and. word == '--') then
                 options = .false.
             else if (options .and. (word == '--help' .or. word == '-h')) then
-                call finish(output_unit, help(example), 0)
+                call tell(help(example))
             else if (options .and. word == '--version') then
-                call finish(output_unit, 'driver_example'//digit//' (frb) '//version, 0)
+                call tell('driver_example'//digit//' (frb) '//version)
             else if (options .and. word == '-o') then
-                call take_value(word, 'a file', i, out_path)
+                call take_value(word, 'a file', i, command%out_path)
             else if (options .and. example == 1 .and. word == '--scheme') then
-                call take_value(word, 'a scheme', i, scheme)
+                call take_value(word, 'a scheme', i, command%scheme)
             else if (options .and. example == 1 .and. word == '--drift') then
-                call take_value(word, 'a drift', i, drift)
-            else if (options .and. index(word, '-') == 1) then
+                call take_value(word, 'a drift', i, command%drift)
+            else if (options .and. index(word, '-') == 1 .and. word /= '-') then
                 call fail('unknown option '//word//' (see --help)')
-            else if (len(init_path) > 0) then
+            else if (len(command%init_path) > 0) then
                 call fail('more than one init file: '//word//' (see --help)')
             else if (len_trim(word) == 0) then
                 call fail('the name of the init file is empty (see --help)')
             else
-                init_path = word
+                command%init_path = word
             end if
         end do
-        if (len(init_path) == 0) init_path = 'data/init_example'//digit//'.dat'
-        if (len(out_path) == 0) out_path = 'out_example'//digit//'.dat'
-    end subroutine read_command_line
+        if (len(command%init_path) == 0) command%init_path = 'data/init_example'//digit//'.dat'
+        if (len(command%out_path) == 0) command%out_path = 'out_example'//digit//'.dat'
+    end subroutine read_command
 
     !> The value of an option, the argument after it.
     subroutine take_value(option, what, i, value)
@@ -168,6 +166,7 @@ contains
                            '.dat by default; data/README.md has the format'//nl// &
                '  -o OUT     output, out_example'//digit//'.dat by default; one record a line:'//nl// &
                '             '//trim(records(example))//nl// &
+               '  -          in the place of INIT or OUT: standard input or output'//nl// &
                more_options// &
                '  --help     this text'//nl// &
                '  --version  name and version'
@@ -185,15 +184,19 @@ contains
         end do
     end function joined
 
-    !> Ends the program with a text and an exit code.
-    subroutine finish(unit, text, code)
-        integer, intent(in) :: unit
+    !> Ends the program with a text on standard output.
+    subroutine tell(text)
         character(*), intent(in) :: text
-        integer, intent(in) :: code
+        type(out_file) :: out
+        character(:), allocatable :: error
 
-        write (unit, '(a)') text
-        flush (unit)
-        call c_exit(int(code, c_int))
-    end subroutine finish
+        call out%open_for_writing('-', error)
+        if (.not. allocated(error)) then
+            call out%write_line(text)
+            call out%commit(error)
+        end if
+        if (allocated(error)) call fail(error)
+        call c_exit(0_c_int)
+    end subroutine tell
 
 end module frb_driver_command

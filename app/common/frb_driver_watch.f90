@@ -1,11 +1,13 @@
 !> What a driver tells about its run: progress while it lasts, and a summary of its cost and of how well
 !> the constants of the motion were kept.
 module frb_driver_watch
+    use frb_driver_command, only: fail
     use frb_kinds, only: wp
     use frb_out_files, only: out_file
-    use frb_rotations, only: cross, norm3, quat_rotate
+    use frb_rotations, only: norm3, quat_rotate
+    use frb_system, only: c_isatty
     use, intrinsic :: iso_c_binding, only: c_int
-    use, intrinsic :: iso_fortran_env, only: error_unit, output_unit, int64
+    use, intrinsic :: iso_fortran_env, only: error_unit, int64
     implicit none
     private
 
@@ -27,23 +29,13 @@ module frb_driver_watch
         procedure :: begin
         procedure :: begin_step
         procedure :: end_step
-        procedure :: report
+        procedure :: finish
         procedure, private :: see
         procedure, private :: see_matrix
         procedure, private :: see_quaternion
         generic :: note => see_matrix, see_quaternion
         procedure, private :: show_progress
     end type run_watch
-
-    interface
-        !> POSIX: 1 if a file descriptor is a terminal.
-        function c_isatty(descriptor) bind(c, name='isatty') result(terminal)
-            import :: c_int
-            implicit none
-            integer(c_int), value :: descriptor
-            integer(c_int) :: terminal
-        end function c_isatty
-    end interface
 
 contains
 
@@ -132,54 +124,66 @@ contains
         self%defect = max(self%defect, defect)
     end subroutine see
 
-    !> Writes the summary to standard output.
-    subroutine report(self, title, h, out)
+    !> Ends a run: the output gets its name, then a summary goes to standard output, or to standard error
+    !> where standard output has the records.
+    subroutine finish(self, title, h, out)
         class(run_watch), intent(inout) :: self
         character(*), intent(in) :: title
         real(wp), intent(in) :: h
-        type(out_file), intent(in) :: out
+        type(out_file), intent(inout) :: out
+        type(out_file) :: summary
+        character(:), allocatable :: error
         integer(int64) :: now, rate
         real(wp) :: size_of_m, size_of_up
+        character(120) :: text
 
+        call out%commit(error)
+        if (allocated(error)) call fail(error)
         call system_clock(now, rate)
         if (self%last_shown > self%run_begun) write (error_unit, '(a)') achar(13)//'steps done: all        '
         size_of_m = positive(self%norm0)
-        write (output_unit, '(a)') title
-        write (output_unit, '(a,i0,2(a,es11.4))') '  steps                      ', self%steps, ' of h =', h, &
+        call summary%open_for_writing(trim(merge('/dev/stderr', '-          ', out%descriptor == 1)), error)
+        if (allocated(error)) call fail(error)
+        call summary%write_line(title)
+        write (text, '(a,i0,2(a,es11.4))') '  steps                      ', self%steps, ' of h =', h, &
             ', to t =', self%steps*h
-        write (output_unit, '(a,es10.3,a)') '  time per step              ', &
-            real(self%ticks, wp)/real(rate, wp)/max(1, self%done), ' s'
-        write (output_unit, '(a,es10.3,a)') '  time of the run            ', &
-            real(now - self%run_begun, wp)/real(rate, wp), ' s, with writing'
-        write (output_unit, '(a)') '  largest change over the run, relative:'
+        call summary%write_line(trim(text))
+        call line('  time per step', real(self%ticks, wp)/real(rate, wp)/max(1, self%done), ' s')
+        call line('  time of the run', real(now - self%run_begun, wp)/real(rate, wp), ' s, with writing')
+        call summary%write_line('  largest change over the run, relative:')
         if (self%torque) then
             size_of_up = positive(norm3(self%up))
-            call line('|m| (turned by torque)', self%norm_drift/size_of_m)
-            call line('Q m (turned by torque)', self%space_drift/size_of_m)
-            call line('Q m along u0', self%vertical_drift/size_of_up/size_of_m)
-            call line('energy, first half', self%energy_drift(1)/positive(self%energy_scale))
-            call line('energy, second half', self%energy_drift(2)/positive(self%energy_scale))
+            call line('    |m| (turned by torque)', self%norm_drift/size_of_m)
+            call line('    Q m (turned by torque)', self%space_drift/size_of_m)
+            call line('    Q m along u0', self%vertical_drift/size_of_up/size_of_m)
+            call line('    energy, first half', self%energy_drift(1)/positive(self%energy_scale))
+            call line('    energy, second half', self%energy_drift(2)/positive(self%energy_scale))
         else
-            call line('|m|', self%norm_drift/size_of_m)
-            call line('Q m', self%space_drift/size_of_m)
-            call line('energy', maxval(self%energy_drift)/positive(self%energy_scale))
+            call line('    |m|', self%norm_drift/size_of_m)
+            call line('    Q m', self%space_drift/size_of_m)
+            call line('    energy', maxval(self%energy_drift)/positive(self%energy_scale))
         end if
-        write (output_unit, '(a,es10.3)') '  attitude off orthogonal by ', self%defect
-        write (output_unit, '(a)') '  written to                 '//out%path
+        call line('  attitude off orthogonal by', self%defect)
+        call summary%write_line('  written to                 '//out%path)
+        call summary%commit(error)
+        if (allocated(error)) call fail('the summary: '//error)
 
     contains
 
         !> One line of the summary.
-        subroutine line(name, value)
+        subroutine line(name, value, unit)
             character(*), intent(in) :: name
             real(wp), intent(in) :: value
-            character(25) :: padded
+            character(*), intent(in), optional :: unit
+            character(29) :: padded
 
             padded = name
-            write (output_unit, '(a,es10.3)') '    '//padded, value
+            write (text, '(a,es10.3)') padded, value
+            if (present(unit)) text = trim(text)//unit
+            call summary%write_line(trim(text))
         end subroutine line
 
-    end subroutine report
+    end subroutine finish
 
     !> A scale to divide by: one in the place of nothing.
     pure function positive(scale)

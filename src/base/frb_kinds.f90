@@ -4,7 +4,7 @@ module frb_kinds
     implicit none
     private
 
-    public :: wp, qp, has_quad, pi, half_pi, two_pi, unit_roundoff
+    public :: wp, qp, has_quad, pi, half_pi, two_pi, unit_roundoff, most_points
 
     !> Working precision: IEEE double.
     integer, parameter :: wp = real64
@@ -20,5 +20,8 @@ module frb_kinds
 
     !> Largest relative error of one rounding, 2^-53.
     real(wp), parameter :: unit_roundoff = epsilon(1.0_wp)/2
+
+    !> Largest number of Gauss points, np, of a semi-exact step or of an integral.
+    integer, parameter :: most_points = 1000
 
 end module frb_kinds

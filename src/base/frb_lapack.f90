@@ -1,5 +1,8 @@
-!> Explicit interfaces of the LAPACK routines the library calls.
+!> Explicit interfaces of the LAPACK routines the library calls. Their kinds are named, not default: they
+!> hold under flags that change the default kinds.
 module frb_lapack
+    use frb_kinds, only: wp
+    use, intrinsic :: iso_fortran_env, only: int32
     implicit none
     private
 
@@ -8,34 +11,34 @@ module frb_lapack
     interface
         !> Eigenvalues (ascending) and eigenvectors of a real symmetric matrix.
         pure subroutine dsyev(jobz, uplo, n, a, lda, w, work, lwork, info)
+            import :: int32, wp
             implicit none
-            integer, parameter :: dp = kind(1.0d0)
             character, intent(in) :: jobz, uplo
-            integer, intent(in) :: n, lda, lwork
-            real(dp), intent(inout) :: a(lda, *)
-            real(dp), intent(out) :: w(*), work(*)
-            integer, intent(out) :: info
+            integer(int32), intent(in) :: n, lda, lwork
+            real(wp), intent(inout) :: a(lda, *)
+            real(wp), intent(out) :: w(*), work(*)
+            integer(int32), intent(out) :: info
         end subroutine dsyev
 
         !> Eigenvalues (ascending) and eigenvectors of a real symmetric tridiagonal matrix.
         pure subroutine dstev(jobz, n, d, e, z, ldz, work, info)
+            import :: int32, wp
             implicit none
-            integer, parameter :: dp = kind(1.0d0)
             character, intent(in) :: jobz
-            integer, intent(in) :: n, ldz
-            real(dp), intent(inout) :: d(*), e(*)
-            real(dp), intent(out) :: z(ldz, *), work(*)
-            integer, intent(out) :: info
+            integer(int32), intent(in) :: n, ldz
+            real(wp), intent(inout) :: d(*), e(*)
+            real(wp), intent(out) :: z(ldz, *), work(*)
+            integer(int32), intent(out) :: info
         end subroutine dstev
 
         !> Solution of a system with a symmetric positive definite matrix, by Cholesky's decomposition.
         pure subroutine dposv(uplo, n, nrhs, a, lda, b, ldb, info)
+            import :: int32, wp
             implicit none
-            integer, parameter :: dp = kind(1.0d0)
             character, intent(in) :: uplo
-            integer, intent(in) :: n, nrhs, lda, ldb
-            real(dp), intent(inout) :: a(lda, *), b(ldb, *)
-            integer, intent(out) :: info
+            integer(int32), intent(in) :: n, nrhs, lda, ldb
+            real(wp), intent(inout) :: a(lda, *), b(ldb, *)
+            integer(int32), intent(out) :: info
         end subroutine dposv
     end interface
 

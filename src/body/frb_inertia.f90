@@ -12,6 +12,7 @@ module frb_inertia
         status_lapack_failed
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
     use, intrinsic :: iso_c_binding, only: c_bool, c_double, c_int
+    use, intrinsic :: iso_fortran_env, only: int32
     implicit none
     private
 
@@ -146,7 +147,8 @@ contains
         integer, intent(out), optional :: stat
         real(wp), parameter :: symmetry_tolerance = 8*epsilon(1.0_wp)
         real(wp) :: largest, scaled(3, 3), work(16)
-        integer :: code, info
+        integer(int32) :: info
+        integer :: code
 
         moments = 0.0_wp
         axes = identity
@@ -162,7 +164,7 @@ contains
             moments = [tensor(1, 1), tensor(2, 2), tensor(3, 3)]
             if (any(abs([tensor(2, 1), tensor(3, 1), tensor(3, 2)]) > 0.0_wp)) then
                 axes = scaled
-                call dsyev('V', 'L', 3, axes, 3, moments, work, size(work), info)
+                call dsyev('V', 'L', 3_int32, axes, 3_int32, moments, work, size(work, kind=int32), info)
                 moments = moments*largest
                 axes(:, 3) = cross(axes(:, 1), axes(:, 2))
                 if (info /= 0) code = status_lapack_failed

@@ -1,6 +1,6 @@
 !> Algorithm 1: the free rigid body with the attitude as a rotation matrix.
 module frb_matrix_step
-    use frb_kinds, only: wp
+    use frb_kinds, only: wp, most_points
     use frb_paper_angle, only: exact_angle, quadrature_angle, angle_by_middle_axis
     use frb_paper_momentum, only: momentum_step, momentum_by_addition, momentum_by_phase
     use frb_paper_motion, only: paper_motion, normal_form, simple_motion, add_momentum, motion_elliptic
@@ -10,9 +10,8 @@ module frb_matrix_step
     implicit none
     private
 
-    public :: frb_step, most_points, largest_attitude
+    public :: frb_step, largest_attitude
 
-    integer, parameter :: most_points = 1000    !! largest number of Gauss points of a step
 
     !> No element of an attitude may be larger: a turn of it could overflow.
     real(wp), parameter :: largest_attitude = 1.0e300_wp

@@ -1,7 +1,7 @@
 !> Algorithm 2: the free rigid body with the attitude as a quaternion, in the three frames of section 1.4.
 module frb_quat_step
-    use frb_kinds, only: wp
-    use frb_matrix_step, only: most_points, largest_attitude
+    use frb_kinds, only: wp, most_points
+    use frb_matrix_step, only: largest_attitude
     use frb_paper_angle, only: exact_angle, quadrature_angle, angle_by_middle_axis, angle_by_outer_axes
     use frb_paper_momentum, only: momentum_step, momentum_by_addition, momentum_by_phase
     use frb_paper_motion, only: paper_motion, normal_form, simple_motion, add_momentum, turn_from_one, &

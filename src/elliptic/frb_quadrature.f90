@@ -1,9 +1,10 @@
 !> Gauss-Legendre quadrature, and the integral of the third kind by it (the semi-exact step).
 module frb_quadrature
-    use frb_kinds, only: wp
+    use frb_kinds, only: wp, most_points
     use frb_lapack, only: dstev
     use frb_status, only: conclude, status_ok, status_bad_count, status_lapack_failed
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_value, ieee_quiet_nan, ieee_positive_inf
+    use, intrinsic :: iso_fortran_env, only: int32
     implicit none
     private
 
@@ -45,12 +46,12 @@ contains
     !> int_-1^1 f(x) dx = sum of weights(i) f(nodes(i)) for polynomials f of degree up to 2 np - 1.
     !> Up to 10 points from a table; beyond, the eigenvalues of the tridiagonal Jacobi matrix (Golub and
     !> Welsch) by LAPACK's `dstev`, polished by a Newton step, and weights from the derivative.
-    !> Errors: status_bad_count for np < 1 or arrays shorter than np, status_lapack_failed; nodes and weights
-    !> are then 0. Elements beyond np are 0.
+    !> Errors: status_bad_count for np < 1, np > 1000 or arrays shorter than np, status_lapack_failed; nodes
+    !> and weights are then 0. Elements beyond np are 0.
     !> Accuracy: nodes 1 epsilon, absolute; weights 1 epsilon, relative, up to 10 points and 8 epsilon from 11
     !> to 64; checked by quadrature: nodes-agree-with-table, weights-beyond-10-points-agree-with-table.
     subroutine gauss_legendre(np, nodes, weights, stat)
-        integer, intent(in) :: np                  !! number of points, >= 1
+        integer, intent(in) :: np                  !! number of points, 1 to 1000
         real(wp), intent(out) :: nodes(:)          !! nodes on [-1, 1], at least np elements
         real(wp), intent(out) :: weights(:)        !! weights, sum 2, at least np elements
         integer, intent(out), optional :: stat     !! status_ok, status_bad_count, status_lapack_failed
@@ -66,13 +67,13 @@ contains
     !> Antisymmetric in phi1, phi2 to rounding, so the step is time-symmetric.
     !> A result beyond the largest number comes back as Infinity.
     !> Domain: phi1, phi2 finite, |k| <= 1 (or 0 <= kc2 <= 1), n sin**2 < 1; outside: NaN.
-    !> Errors: status_bad_count for np < 1 (the value is then NaN), status_lapack_failed.
+    !> Errors: status_bad_count for np < 1 or np > 1000 (the value is then NaN), status_lapack_failed.
     !> Source: section 3.3, (20).
     function eint_gauss(phi1, phi2, n, k, np, kc2, nc, stat) result(value)
         real(wp), intent(in) :: phi1, phi2         !! limits of the integral [rad]
         real(wp), intent(in) :: n                  !! characteristic
         real(wp), intent(in) :: k                  !! modulus
-        integer, intent(in) :: np                  !! number of points, >= 1
+        integer, intent(in) :: np                  !! number of points, 1 to 1000
         real(wp), intent(in), optional :: kc2      !! 1 - k**2; k is then not used
         real(wp), intent(in), optional :: nc       !! 1 - n; n is then not used
         integer, intent(out), optional :: stat     !! status_ok, status_bad_count, status_lapack_failed
@@ -85,7 +86,7 @@ contains
         value = ieee_value(1.0_wp, ieee_quiet_nan)
         code = status_ok
         call check_arguments(phi1, phi2, n, k, kc2, nc, complement, rest, valid)
-        if (np < 1) then
+        if (np < 1 .or. np > most_points) then
             code = status_bad_count
         else if (np <= most_tabulated) then
             first = before(np) + 1
@@ -187,7 +188,7 @@ contains
         nodes = 0.0_wp
         weights = 0.0_wp
         code = status_ok
-        if (np < 1 .or. np > min(size(nodes), size(weights))) then
+        if (np < 1 .or. np > min(size(nodes), size(weights), most_points)) then
             code = status_bad_count
         else if (np <= most_tabulated) then
             half = (np + 1)/2
@@ -209,14 +210,15 @@ contains
         integer, intent(out) :: code
         real(wp), allocatable :: off_diagonal(:), eigenvalues(:)
         real(wp) :: unused_vectors(1, 1), unused_work(1), x, before_last, value, slope
-        integer :: i, info
+        integer(int32) :: info
+        integer :: i
 
         allocate (off_diagonal(np - 1), eigenvalues(np))
         eigenvalues = 0.0_wp
         do i = 1, np - 1
             off_diagonal(i) = i/sqrt((2*real(i, wp) - 1)*(2*real(i, wp) + 1))
         end do
-        call dstev('N', np, eigenvalues, off_diagonal, unused_vectors, 1, unused_work, info)
+        call dstev('N', int(np, int32), eigenvalues, off_diagonal, unused_vectors, 1_int32, unused_work, info)
         if (info /= 0) then
             code = status_lapack_failed
             return

@@ -9,10 +9,11 @@
 !> | 4 | h, Tfin, m(3), q(4), I(3), np |
 !>
 !> Matrices stand column by column, quaternions scalar first; np = 0 means exact. What the numbers look
-!> like is said in `frb_number_files`. A file is refused at its first number that cannot be meant.
+!> like is said in `frb_number_files`. A file is rejected at its first number that cannot be meant.
 module frb_init_files
-    use frb_kinds, only: wp
+    use frb_kinds, only: wp, most_points
     use frb_number_files, only: number_file
+    use frb_out_files, only: is_special
     implicit none
     private
 
@@ -41,22 +42,26 @@ module frb_init_files
     !> counts as whole.
     real(wp), parameter :: quotient_tolerance = 1.0e-8_wp
 
-    !> Most steps of a run, and most Gauss points.
+    !> Most steps of a run.
     integer, parameter :: most_steps = 2000000000
-    integer, parameter :: most_points = 1000
 
 contains
 
     !> Reads the init file of an example.
-    subroutine read_init_file(path, example, values, error)
-        character(*), intent(in) :: path
+    !>
+    !> The published programs read every item from a line of its own and drop what is left on the line; here
+    !> items may share a line. A file that is refused is therefore read again in the published way: if that
+    !> succeeds, the error is about the first number that would be dropped, on its line.
+    subroutine read_init_file(path, example, values, error, output)
+        character(*), intent(in) :: path                    !! -: standard input
         integer, intent(in) :: example                      !! 0 to 4
         type(init_values), intent(out) :: values            !! defaults from the first error on
         character(:), allocatable, intent(out) :: error     !! allocated if the file is refused: one line
-        ! One letter an item: a and b coefficients, h, T = Tfin, m, Q, q, I = moments, u = u0, n = np.
-        character(*), parameter :: layouts(0:4) = ['hImQ    ', 'abhTmQIu', 'hImq    ', 'hTmQIn  ', 'hTmqIn  ']
+        character(*), intent(in), optional :: output        !! refused if it is the init file, by any name
         type(number_file) :: file
-        integer :: i
+        type(init_values) :: by_lines
+        character(:), allocatable :: again
+        logical :: same
 
         if (example < 0 .or. example > 4) then
             error = trim(path)//': there is no init file of this example'
@@ -64,18 +69,42 @@ contains
         end if
         call file%open_for_reading(path, error)
         if (allocated(error)) return
+        if (present(output)) then
+            same = file%is_file(output)
+            if (same .and. .not. is_special(output)) then
+                error = file%path//': is the input, it cannot be the output too'
+            end if
+        end if
+        if (.not. allocated(error)) then
+            call read_items(file, example, values, error)
+            if (allocated(error)) then
+                call file%start_over(by_lines=.true.)
+                call read_items(file, example, by_lines, again)
+                if (allocated(file%surplus) .and. .not. allocated(again)) error = file%surplus
+                error = error//' (example '//achar(iachar('0') + example)//' has '//contents(example)//')'
+                values = init_values()
+            end if
+        end if
+        call file%close_file()
+    end subroutine read_init_file
+
+    !> Reads all items of an example, and nothing must be left.
+    subroutine read_items(file, example, values, error)
+        type(number_file), intent(inout) :: file
+        integer, intent(in) :: example
+        type(init_values), intent(out) :: values
+        character(:), allocatable, intent(out) :: error
+        ! One letter an item: a and b coefficients, h, T = Tfin, m, Q, q, I = moments, u = u0, n = np.
+        character(*), parameter :: layouts(0:4) = ['hImQ    ', 'abhTmQIu', 'hImq    ', 'hTmQIn  ', 'hTmqIn  ']
+        integer :: i
+
         do i = 1, len_trim(layouts(example))
             call read_item(file, layouts(example) (i:i), values, error)
-            if (allocated(error)) exit
+            if (allocated(error)) return
         end do
-        if (.not. allocated(error)) call file%expect_end(item_name(layouts(example)), error)
-        if (.not. allocated(error) .and. index(layouts(example), 'T') == 0) values%t_final = values%h
-        call file%close_file()
-        if (allocated(error)) then
-            error = error//' (example '//achar(iachar('0') + example)//' has '//contents(example)//')'
-            values = init_values()
-        end if
-    end subroutine read_init_file
+        if (index(layouts(example), 'T') == 0) values%t_final = values%h
+        call file%expect_end(error)
+    end subroutine read_items
 
     !> The number of steps N = int(Tfin/h) of a run to t_final in steps near h, both of one sign; 0 when
     !> there is no such number (h or t_final zero, of different signs, h beyond t_final, more than 2e9
@@ -102,6 +131,7 @@ contains
         type(init_values), intent(inout) :: values
         character(:), allocatable, intent(out) :: error
         real(wp) :: flat(9), number
+        character(12) :: limit
 
         select case (letter)
         case ('a')
@@ -145,7 +175,8 @@ contains
             call file%read_number('np', number, error)
             if (allocated(error)) return
             if (number < 0.0_wp .or. number > most_points .or. abs(number - aint(number)) > 0.0_wp) then
-                error = file%complaint('np', 'a whole number from 0 to 1000', text(number))
+                write (limit, '(i0)') most_points
+                error = file%complaint('np', 'a whole number from 0 to '//trim(limit), text(number))
             else
                 values%points = nint(number)
             end if
@@ -225,23 +256,6 @@ contains
             end if
         end do
     end subroutine check_moments
-
-    !> Name of the last item of a layout, for messages.
-    pure function item_name(layout) result(name)
-        character(*), intent(in) :: layout
-        character(:), allocatable :: name
-
-        select case (layout(len_trim(layout):len_trim(layout)))
-        case ('Q')
-            name = 'Q(9)'
-        case ('q')
-            name = 'q(4)'
-        case ('u')
-            name = 'u0(3)'
-        case default
-            name = 'np'
-        end select
-    end function item_name
 
     !> What the init file of an example holds, for messages.
     pure function contents(example) result(list)

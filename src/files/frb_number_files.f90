@@ -1,11 +1,19 @@
-!> Files of numbers, read one number at a time, every error with its file, line and item.
+!> Files of numbers, read item by item as Fortran's list-directed input reads them; every error tells its
+!> file, line and item.
 !>
-!> Numbers stand between blanks, tabs or line ends; a comment runs from # or ! to the end of its line.
-!> A number is what Fortran and C both write: an optional sign, digits with an optional point, and an
-!> optional exponent after E, e, D or d. Errors are values: `error` comes back allocated when something
-!> is wrong, as one line of text.
+!> Values stand between blanks, tabs or line ends, with at most one comma between two of them; `3*0.5` stands
+!> for three. A number is an optional sign, digits with an optional point, and an optional exponent: E, D or
+!> Q, in either case, and a whole number, or that number with its sign alone (`1+5`). Words behind the last
+!> number of an item are passed over to the end of the line. A list-directed read leaves a variable unset for
+!> nothing between commas, for `3*` and for a slash: here they are errors.
+!>
+!> Beyond that, a comment runs from # or ! to the end of its line, several items may share a line, and a byte
+!> order mark of UTF-8 is skipped. Errors are values: `error` comes back allocated when something is wrong, as
+!> one line of text.
 module frb_number_files
     use frb_kinds, only: wp
+    use frb_number_words, only: is_blank, is_too_large, is_value, quoted, split_value
+    use, intrinsic :: iso_fortran_env, only: input_unit
     implicit none
     private
 
@@ -17,80 +25,120 @@ module frb_number_files
     !> Longest line accepted, so that a file without line ends is refused in time.
     integer, parameter :: longest_line = 100000
 
-    !> A file open for reading, and the place reached in it.
+    !> Characters taken from the file at a time.
+    integer, parameter :: piece = 512
+
+    !> A line of the file that is not blank, without its comment.
+    type :: text_line
+        integer :: number = 0
+        character(:), allocatable :: text
+    end type text_line
+
+    !> A file open for reading, and the place reached in it. Its lines are kept, so that standard input too
+    !> can be read from the first number again.
     type :: number_file
         character(:), allocatable :: path           !! as the caller gave it
         integer :: line_number = 0                  !! of the number read last; 0 before the first
-        character(:), allocatable, private :: line  !! the current line without its comment
-        integer, private :: position = 1            !! where in `line` the next number is looked for
+        character(:), allocatable :: surplus        !! error about the first number that `by_lines` dropped
+        type(text_line), allocatable, private :: lines(:)
+        character(:), allocatable, private :: buffer    !! for the line that is being read
+        character(:), allocatable, private :: last      !! name of the item read last, with its size
+        character(:), allocatable, private :: word      !! the number read last, as it is written
+        real(wp), private :: value = 0.0_wp         !! the number read last
+        integer, private :: repeats = 0             !! how many more times it comes
+        logical, private :: comma_may_follow = .false.
+        logical, private :: by_lines = .false.      !! every item begins a line
+        integer, private :: kept = 0                !! number of lines kept
+        integer, private :: current = 0             !! where the next number is looked for: a line kept,
+        integer, private :: position = 1            !! and a place in it
+        integer, private :: lines_read = 0          !! blank ones too
         integer, private :: unit = 0
         logical, private :: at_end = .false.
     contains
         procedure :: open_for_reading
+        procedure :: is_file
+        procedure :: start_over
         procedure :: read_number
         procedure :: read_numbers
         procedure :: expect_end
         procedure :: complaint
         procedure :: close_file
-        procedure, private :: next_word
+        procedure, private :: begin_item
+        procedure, private :: next_number
+        procedure, private :: find_word
+        procedure, private :: word_here
         procedure, private :: next_line
+        procedure, private :: keep_line
     end type number_file
 
 contains
 
     !> Opens a file for reading.
     subroutine open_for_reading(self, path, error)
-        class(number_file), intent(inout) :: self
-        character(*), intent(in) :: path                    !! trailing blanks do not count
+        class(number_file), intent(out) :: self
+        character(*), intent(in) :: path                    !! -: standard input; no blanks at its end
         character(:), allocatable, intent(out) :: error     !! allocated if it cannot be opened
         integer :: io
 
         self%path = trim(path)
-        self%line = ''
-        self%position = 1
-        self%line_number = 0
-        self%at_end = .false.
+        self%last = 'the begin'
+        self%word = ''
+        allocate (self%lines(64))
+        allocate (character(longest_line + piece) :: self%buffer)
+        if (self%path == '-') then
+            self%path = 'standard input'
+            self%unit = input_unit
+            return
+        end if
         open (newunit=self%unit, file=self%path, status='old', action='read', iostat=io)
         if (io /= 0) error = self%path//': cannot be opened for reading'
     end subroutine open_for_reading
+
+    !> Whether a path leads to the file that is open here, by whatever name or link.
+    function is_file(self, path) result(same)
+        class(number_file), intent(in) :: self
+        character(*), intent(in) :: path
+        logical :: same
+        integer :: unit, io
+
+        inquire (file=path, number=unit, iostat=io)
+        same = io == 0 .and. unit == self%unit
+    end function is_file
+
+    !> Goes back to the first number. With `by_lines` every item then begins a line, as if each were read by a
+    !> statement of its own: numbers left on a line are dropped, and `surplus` tells the first of them.
+    subroutine start_over(self, by_lines)
+        class(number_file), intent(inout) :: self
+        logical, intent(in) :: by_lines
+
+        self%by_lines = by_lines
+        self%current = 0
+        self%position = 1
+        self%repeats = 0
+        self%comma_may_follow = .false.
+    end subroutine start_over
 
     !> Closes the file.
     subroutine close_file(self)
         class(number_file), intent(inout) :: self
         integer :: io
 
-        close (self%unit, iostat=io)
+        if (self%unit /= input_unit) close (self%unit, iostat=io)
     end subroutine close_file
 
-    !> The next number of the file.
+    !> An item of one number.
     subroutine read_number(self, item, value, error)
         class(number_file), intent(inout) :: self
         character(*), intent(in) :: item                    !! its name, for messages
         real(wp), intent(out) :: value                      !! 0 on error
         character(:), allocatable, intent(out) :: error
-        character(:), allocatable :: word
-        logical :: too_large
-        integer :: io
 
-        value = 0.0_wp
-        call self%next_word(word, error)
-        if (allocated(error)) return
-        if (len(word) == 0) then
-            error = self%complaint(item, 'a number', 'the end of the file')
-        else if (.not. is_number(word)) then
-            error = self%complaint(item, 'a number', quoted(word))
-        else
-            call check_magnitude(word, too_large)
-            if (too_large) then
-                error = self%complaint(item, 'a number of magnitude at most 1e100', quoted(word))
-            else
-                read (word, *, iostat=io) value
-                if (io /= 0) error = self%complaint(item, 'a number', quoted(word))
-            end if
-        end if
+        call self%begin_item()
+        call self%next_number(item, value, error)
+        self%last = item
     end subroutine read_number
 
-    !> The next numbers of the file, as many as `values` holds.
+    !> An item of as many numbers as `values` holds.
     subroutine read_numbers(self, item, values, error)
         class(number_file), intent(inout) :: self
         character(*), intent(in) :: item                    !! their common name, for messages
@@ -100,23 +148,30 @@ contains
         integer :: i
 
         values = 0.0_wp
+        call self%begin_item()
         do i = 1, size(values)
             write (number, '(a,i0,a)') '(', i, ')'
-            call self%read_number(item//trim(number), values(i), error)
+            call self%next_number(item//trim(number), values(i), error)
             if (allocated(error)) return
         end do
+        self%last = item//trim(number)
     end subroutine read_numbers
 
-    !> Complains unless nothing but blanks and comments is left.
-    subroutine expect_end(self, last_item, error)
+    !> Complains if a number is left: on the line of the last item, or on the lines after it up to the first
+    !> that begins with another word.
+    subroutine expect_end(self, error)
         class(number_file), intent(inout) :: self
-        character(*), intent(in) :: last_item               !! name of the item read last
         character(:), allocatable, intent(out) :: error
-        character(:), allocatable :: word
+        logical :: found
 
-        call self%next_word(word, error)
-        if (allocated(error)) return
-        if (len(word) > 0) error = self%complaint('after '//last_item, 'the end of the file', quoted(word))
+        call self%begin_item()
+        if (self%repeats == 0) then
+            call self%find_word(found, error)
+            if (allocated(error) .or. .not. found) return
+            self%word = self%word_here()
+            if (.not. is_value(self%word)) return
+        end if
+        error = self%complaint('after '//self%last, 'the end of the file', quoted(self%word))
     end subroutine expect_end
 
     !> One line that says where something is wrong, what was expected there and what was found.
@@ -130,165 +185,180 @@ contains
         error = self%path//', line '//trim(number)//': '//item//': expected '//expected//', found '//found
     end function complaint
 
-    !> The next word, on whatever line it is; empty at the end of the file.
-    subroutine next_word(self, word, error)
+    !> What is left on the line of the last item belongs to the next one if it begins with a number; other
+    !> words, and with `by_lines` numbers too, are passed over.
+    subroutine begin_item(self)
         class(number_file), intent(inout) :: self
-        character(:), allocatable, intent(out) :: word
-        character(:), allocatable, intent(out) :: error
-        integer :: first, last
+        logical :: goes_on
 
-        do
-            first = self%position
-            do while (first <= len(self%line))
-                if (.not. is_blank(self%line(first:first))) exit
-                first = first + 1
+        if (self%current == 0) return
+        associate (text => self%lines(self%current)%text)
+            goes_on = self%repeats > 0
+            if (.not. goes_on) then
+                do while (self%position <= len(text))
+                    if (.not. (is_blank(text(self%position:self%position)) .or. &
+                               text(self%position:self%position) == ',')) exit
+                    self%position = self%position + 1
+                end do
+                goes_on = is_value(self%word_here())
+                if (goes_on) self%word = self%word_here()
+            end if
+            if (goes_on .and. .not. self%by_lines) return
+            if (goes_on .and. .not. allocated(self%surplus)) then
+                self%surplus = self%complaint('after '//self%last, 'the end of the line', quoted(self%word))
+            end if
+            self%repeats = 0
+            self%position = len(text) + 1
+            self%comma_may_follow = .false.
+        end associate
+    end subroutine begin_item
+
+    !> The next number of an item.
+    subroutine next_number(self, item, value, error)
+        class(number_file), intent(inout) :: self
+        character(*), intent(in) :: item
+        real(wp), intent(out) :: value                      !! 0 on error
+        character(:), allocatable, intent(out) :: error
+        character(:), allocatable :: number
+        logical :: found
+        integer :: io
+
+        value = 0.0_wp
+        if (self%repeats == 0) then
+            do
+                call self%find_word(found, error)
+                if (allocated(error)) return
+                if (.not. found) then
+                    error = self%complaint(item, 'a number', 'the end of the file')
+                    return
+                end if
+                self%word = self%word_here()
+                if (len(self%word) > 0) exit
+                ! The word is empty in front of a comma.
+                if (.not. self%comma_may_follow) then
+                    error = self%complaint(item, 'a number', 'nothing before a comma')
+                    return
+                end if
+                self%comma_may_follow = .false.
+                self%position = self%position + 1
             end do
-            if (first <= len(self%line)) exit
-            if (.not. self%at_end) call self%next_line(error)
-            if (self%at_end .or. allocated(error)) then
-                word = ''
+            ! A slash ends a list-directed read.
+            if (index(self%word, '/') > 1) self%word = self%word(:index(self%word, '/') - 1)
+            call split_value(self%word, self%repeats, number)
+            io = 0
+            if (self%repeats > 0) then
+                if (is_too_large(number)) then
+                    error = self%complaint(item, 'a number of magnitude at most 1e100', quoted(self%word))
+                    return
+                end if
+                read (number, *, iostat=io) self%value
+            end if
+            if (self%repeats == 0 .or. io /= 0) then
+                error = self%complaint(item, 'a number', quoted(self%word))
                 return
             end if
-        end do
-        last = first
-        do while (last < len(self%line))
-            if (is_blank(self%line(last + 1:last + 1))) exit
-            last = last + 1
-        end do
-        word = self%line(first:last)
-        self%position = last + 1
-    end subroutine next_word
+            self%position = self%position + len(self%word)
+            self%comma_may_follow = .true.
+        end if
+        self%repeats = self%repeats - 1
+        value = self%value
+    end subroutine next_number
 
-    !> Reads one more line and drops its comment; sets `at_end` when there is none.
+    !> Goes on to the next character that is not blank, on whatever line it is.
+    subroutine find_word(self, found, error)
+        class(number_file), intent(inout) :: self
+        logical, intent(out) :: found                       !! false at the end of the file
+        character(:), allocatable, intent(out) :: error
+
+        found = .false.
+        do
+            if (self%current > 0) then
+                associate (text => self%lines(self%current)%text)
+                    do while (self%position <= len(text))
+                        found = .not. is_blank(text(self%position:self%position))
+                        if (found) return
+                        self%position = self%position + 1
+                    end do
+                end associate
+            end if
+            do while (self%current == self%kept)
+                self%line_number = self%lines_read
+                if (self%at_end) return
+                call self%next_line(error)
+                if (allocated(error)) return
+            end do
+            self%current = self%current + 1
+            self%position = 1
+            self%line_number = self%lines(self%current)%number
+        end do
+    end subroutine find_word
+
+    !> The word at the place reached, up to a blank or a comma.
+    pure function word_here(self) result(word)
+        class(number_file), intent(in) :: self
+        character(:), allocatable :: word
+        integer :: last
+
+        associate (text => self%lines(self%current)%text)
+            last = self%position - 1
+            do while (last < len(text))
+                if (is_blank(text(last + 1:last + 1)) .or. text(last + 1:last + 1) == ',') exit
+                last = last + 1
+            end do
+            word = text(self%position:last)
+        end associate
+    end function word_here
+
+    !> Reads one more line; sets `at_end` when it is the last.
     subroutine next_line(self, error)
         class(number_file), intent(inout) :: self
         character(:), allocatable, intent(out) :: error
-        character(:), allocatable :: line, longer
-        integer :: io, length, used, comment
+        integer :: io, length, taken
 
-        self%line = ''
-        self%position = 1
-        allocate (character(512) :: line)
-        used = 0
+        length = 0
         do
-            read (self%unit, '(a)', advance='no', size=length, iostat=io) line(used + 1:)
-            if (is_iostat_end(io)) then
-                self%at_end = .true.
-                return
-            end if
+            read (self%unit, '(a)', advance='no', size=taken, iostat=io) &
+                self%buffer(length + 1:length + piece)
+            self%at_end = is_iostat_end(io)
+            if (self%at_end) exit
             if (.not. (io == 0 .or. is_iostat_eor(io))) then
                 error = self%path//': cannot be read'
                 return
             end if
-            used = used + length
+            length = length + taken
             if (is_iostat_eor(io)) exit
-            if (used > longest_line) then
-                self%line_number = self%line_number + 1
+            if (length > longest_line) then
+                self%line_number = self%lines_read + 1
                 error = self%complaint('line', 'at most 100000 characters', 'more')
                 return
             end if
-            ! Doubled, not joined: the part of a line read so far is copied few times, never to the stack.
-            allocate (character(2*len(line)) :: longer)
-            longer(:used) = line
-            call move_alloc(longer, line)
         end do
-        self%line_number = self%line_number + 1
-        comment = scan(line(:used), '#!')
-        if (comment > 0) used = comment - 1
-        self%line = line(:used)
+        if (self%at_end .and. length == 0) return
+        self%lines_read = self%lines_read + 1
+        call self%keep_line(self%buffer(:length))
     end subroutine next_line
 
-    !> Whether a character separates words: blank, tab, or the carriage return of a foreign line end.
-    elemental function is_blank(character) result(blank)
-        character, intent(in) :: character
-        logical :: blank
+    !> Keeps a line, without its comment, unless it is blank.
+    subroutine keep_line(self, line)
+        class(number_file), intent(inout) :: self
+        character(*), intent(in) :: line
+        character(*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
+        type(text_line), allocatable :: more(:)
+        integer :: first, last
 
-        blank = character == ' ' .or. iachar(character) == 9 .or. iachar(character) == 13
-    end function is_blank
-
-    !> Whether a word is a number: [sign] digits [. digits] [E|D [sign] digits], a digit before the exponent.
-    pure function is_number(word) result(number)
-        character(*), intent(in) :: word
-        logical :: number
-        character(*), parameter :: digits = '0123456789'
-        character(:), allocatable :: mantissa, exponent
-        integer :: split, point
-
-        number = .false.
-        split = scan(word, 'EeDd')
-        if (split > 0) then
-            mantissa = unsigned(word(:split - 1))
-            exponent = unsigned(word(split + 1:))
-            if (len(exponent) == 0 .or. verify(exponent, digits) > 0) return
-        else
-            mantissa = unsigned(word)
+        first = 1
+        if (self%lines_read == 1 .and. index(line, byte_order_mark) == 1) first = 1 + len(byte_order_mark)
+        last = scan(line, '#!') - 1
+        if (last < 0) last = len(line)
+        if (verify(line(first:last), ' '//achar(9)//achar(13)) == 0) return
+        if (self%kept == size(self%lines)) then
+            allocate (more(2*self%kept))
+            more(:self%kept) = self%lines
+            call move_alloc(more, self%lines)
         end if
-        point = index(mantissa, '.')
-        if (point > 0) mantissa = mantissa(:point - 1)//mantissa(point + 1:)
-        number = len(mantissa) > 0 .and. verify(mantissa, digits) == 0
-    end function is_number
-
-    !> Whether a number is beyond `largest_magnitude`, from its text: converting first would overflow.
-    pure subroutine check_magnitude(word, too_large)
-        character(*), intent(in) :: word    !! a number
-        logical, intent(out) :: too_large
-        character(:), allocatable :: mantissa, exponent_text
-        integer :: split, point, leading, exponent, io
-        integer, parameter :: most_digits = 8
-
-        split = scan(word, 'EeDd')
-        if (split == 0) split = len(word) + 1
-        mantissa = unsigned(word(:split - 1))
-        point = scan(mantissa, '.')
-        if (point == 0) point = len(mantissa) + 1
-        leading = scan(mantissa, '123456789')
-        too_large = .false.
-        if (leading == 0) return
-        exponent = 0
-        if (split < len(word)) then
-            exponent_text = unsigned(word(split + 1:))
-            exponent_text = exponent_text(max(1, verify(exponent_text//'1', '0')):)
-            if (len(exponent_text) > most_digits) then
-                exponent = 10**most_digits
-            else if (len(exponent_text) > 0) then
-                read (exponent_text, *, iostat=io) exponent
-            end if
-            if (word(split + 1:split + 1) == '-') exponent = -exponent
-        end if
-        ! Power of ten of the first digit that is not 0.
-        exponent = exponent + point - leading
-        if (leading < point) exponent = exponent - 1
-        too_large = exponent > 100
-        if (exponent == 100) then
-            mantissa(leading:leading) = char(ichar(mantissa(leading:leading)) - 1)
-            too_large = scan(mantissa, '123456789') > 0
-        end if
-    end subroutine check_magnitude
-
-    !> A word without its sign.
-    pure function unsigned(word) result(rest)
-        character(*), intent(in) :: word
-        character(:), allocatable :: rest
-
-        rest = word
-        if (len(word) > 0) then
-            if (word(1:1) == '+' .or. word(1:1) == '-') rest = word(2:)
-        end if
-    end function unsigned
-
-    !> A word in quotes, cut at 40 characters, with ? for what cannot be printed.
-    pure function quoted(word) result(text)
-        character(*), intent(in) :: word
-        character(:), allocatable :: text
-        integer, parameter :: longest = 40
-        integer :: i
-
-        text = word(:min(len(word), longest))
-        do i = 1, len(text)
-            if (iachar(text(i:i)) < 32 .or. iachar(text(i:i)) > 126) text(i:i) = '?'
-        end do
-        if (len(word) > longest) text = text//'...'
-        text = "'"//text//"'"
-    end function quoted
+        self%kept = self%kept + 1
+        self%lines(self%kept)%number = self%lines_read
+        self%lines(self%kept)%text = line(first:last)
+    end subroutine keep_line
 
 end module frb_number_files

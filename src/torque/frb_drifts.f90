@@ -3,7 +3,7 @@
 module frb_drifts
     use frb_free_flow, only: core_of, free_flow, rigid_body
     use frb_inertia, only: body_core
-    use frb_kinds, only: wp
+    use frb_kinds, only: wp, most_points
     use frb_matrix_step, only: frb_step
     use frb_quat_step, only: quat_step
     use frb_rotations, only: matrix_to_quat, quat_conjugate, quat_product, quat_rotate
@@ -44,7 +44,7 @@ contains
         character(*), intent(in) :: name
         class(body_drift), allocatable, intent(out) :: drift
         integer, intent(out), optional :: stat
-        integer, parameter :: most_digits = 4, most_points = 1000
+        integer, parameter :: most_digits = 4
         character(:), allocatable :: digits
         integer :: colon, points, code
 

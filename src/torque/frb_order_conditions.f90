@@ -19,6 +19,7 @@
 module frb_order_conditions
     use frb_kinds, only: wp
     use frb_lapack, only: dposv
+    use, intrinsic :: iso_fortran_env, only: int32
     implicit none
     private
 
@@ -166,7 +167,8 @@ contains
         real(wp) :: rest(2**length:2**(length + 1) - 1)
         real(wp), allocatable :: products(:, :), matrix(:, :), along(:)
         integer, allocatable :: words(:, :)                     ! of each element of the basis
-        integer :: rank, word, after, i, j, k, pass, info
+        integer(int32) :: n, info
+        integer :: rank, word, after, i, j, k, pass
 
         allocate (words(4, 2**length))
         rank = 0
@@ -196,7 +198,8 @@ contains
                 along(j) = sum(relation*rest(words(:, j)))
             end do
             matrix = products
-            if (rank > 0) call dposv('L', rank, 1, matrix, rank, along, rank, info)
+            n = int(rank, int32)
+            if (n > 0) call dposv('L', n, 1_int32, matrix, n, along, n, info)
             do j = 1, rank
                 rest(words(:, j)) = rest(words(:, j)) - along(j)*relation
             end do

@@ -1,0 +1,136 @@
+!> What is called of C and POSIX: streams that tell when a disk is full, names of files, the process.
+module frb_system
+    use, intrinsic :: iso_c_binding, only: c_char, c_int, c_intptr_t, c_long, c_ptr, c_size_t
+    implicit none
+    private
+
+    public :: c_fopen, c_fdopen, c_fwrite, c_ftell, c_fflush, c_fclose
+    public :: c_rename, c_remove, c_readlink, c_realpath, c_getpid, c_geteuid, c_isatty, c_exit, c_signal
+
+    interface
+        !> C: opens a file; a null pointer if that cannot be done.
+        function c_fopen(path, mode) bind(c, name='fopen') result(stream)
+            import :: c_char, c_ptr
+            implicit none
+            character(kind=c_char), intent(in) :: path(*), mode(*)
+            type(c_ptr) :: stream
+        end function c_fopen
+
+        !> POSIX: opens a descriptor that is open already: 1 is standard output, 2 standard error.
+        function c_fdopen(descriptor, mode) bind(c, name='fdopen') result(stream)
+            import :: c_char, c_int, c_ptr
+            implicit none
+            integer(c_int), value :: descriptor
+            character(kind=c_char), intent(in) :: mode(*)
+            type(c_ptr) :: stream
+        end function c_fdopen
+
+        !> C: writes so many items of a size; comes back with the number that was written.
+        function c_fwrite(text, item, items, stream) bind(c, name='fwrite') result(written)
+            import :: c_char, c_ptr, c_size_t
+            implicit none
+            character(kind=c_char), intent(in) :: text(*)
+            integer(c_size_t), value :: item, items
+            type(c_ptr), value :: stream
+            integer(c_size_t) :: written
+        end function c_fwrite
+
+        !> C: the place in a stream, negative if it has none, as a pipe.
+        function c_ftell(stream) bind(c, name='ftell') result(place)
+            import :: c_long, c_ptr
+            implicit none
+            type(c_ptr), value :: stream
+            integer(c_long) :: place
+        end function c_ftell
+
+        !> C: writes what is left in memory; 0 if done.
+        function c_fflush(stream) bind(c, name='fflush') result(failed)
+            import :: c_int, c_ptr
+            implicit none
+            type(c_ptr), value :: stream
+            integer(c_int) :: failed
+        end function c_fflush
+
+        !> C: the same, and closes the stream.
+        function c_fclose(stream) bind(c, name='fclose') result(failed)
+            import :: c_int, c_ptr
+            implicit none
+            type(c_ptr), value :: stream
+            integer(c_int) :: failed
+        end function c_fclose
+
+        !> C: gives a file another name in one step, replacing a file that had it; 0 if done.
+        function c_rename(old, new) bind(c, name='rename') result(failed)
+            import :: c_char, c_int
+            implicit none
+            character(kind=c_char), intent(in) :: old(*), new(*)
+            integer(c_int) :: failed
+        end function c_rename
+
+        !> C: removes a file; 0 if done.
+        function c_remove(path) bind(c, name='remove') result(failed)
+            import :: c_char, c_int
+            implicit none
+            character(kind=c_char), intent(in) :: path(*)
+            integer(c_int) :: failed
+        end function c_remove
+
+        !> POSIX: where a link leads to, and the length of that, negative if it is no link.
+        function c_readlink(path, text, size) bind(c, name='readlink') result(length)
+            import :: c_char, c_size_t
+            implicit none
+            character(kind=c_char), intent(in) :: path(*)
+            character(kind=c_char), intent(out) :: text(*)
+            integer(c_size_t), value :: size
+            integer(c_size_t) :: length
+        end function c_readlink
+
+        !> POSIX: the name of a file without links, into a text of 4096 characters; null if there is none.
+        function c_realpath(path, text) bind(c, name='realpath') result(name)
+            import :: c_char, c_ptr
+            implicit none
+            character(kind=c_char), intent(in) :: path(*)
+            character(kind=c_char), intent(inout) :: text(*)
+            type(c_ptr) :: name
+        end function c_realpath
+
+        !> POSIX: the number of this process.
+        function c_getpid() bind(c, name='getpid') result(process)
+            import :: c_int
+            implicit none
+            integer(c_int) :: process
+        end function c_getpid
+
+        !> POSIX: the user whose rights this process has; 0 is root.
+        function c_geteuid() bind(c, name='geteuid') result(user)
+            import :: c_int
+            implicit none
+            integer(c_int) :: user
+        end function c_geteuid
+
+        !> POSIX: 1 if a descriptor is a terminal.
+        function c_isatty(descriptor) bind(c, name='isatty') result(terminal)
+            import :: c_int
+            implicit none
+            integer(c_int), value :: descriptor
+            integer(c_int) :: terminal
+        end function c_isatty
+
+        !> C: ends the program with an exit code and, unlike `stop`, without a word.
+        subroutine c_exit(code) bind(c, name='exit')
+            import :: c_int
+            implicit none
+            integer(c_int), value :: code
+        end subroutine c_exit
+
+        !> C: what is to be done when a signal comes in; comes back with what was done before.
+        function c_signal(signal, action) bind(c, name='signal') result(before)
+            import :: c_int, c_intptr_t
+            implicit none
+            integer(c_int), value :: signal
+            integer(c_intptr_t), value :: action
+            integer(c_intptr_t) :: before
+        end function c_signal
+    end interface
+
+end module frb_system
