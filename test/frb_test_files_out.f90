@@ -5,7 +5,7 @@ module frb_test_files_out
     use frb_kinds, only: wp
     use frb_out_files, only: out_file
     use frb_system, only: c_getpid
-    use frb_version, only: version
+    use frb_release, only: version
     implicit none
     private
 

@@ -7,7 +7,7 @@ module frb_driver_command
     use frb_init_files, only: init_values, read_init_file
     use frb_out_files, only: out_file
     use frb_system, only: c_exit, c_signal
-    use frb_version, only: version
+    use frb_release, only: version
     use, intrinsic :: iso_c_binding, only: c_int, c_intptr_t
     use, intrinsic :: iso_fortran_env, only: error_unit
     implicit none

@@ -1,5 +1,5 @@
 !> The version of the package; a test holds it to the one in fpm.toml.
-module frb_version
+module frb_release
     implicit none
     private
 
@@ -7,4 +7,4 @@ module frb_version
 
     character(*), parameter :: version = '0.1.0'
 
-end module frb_version
+end module frb_release

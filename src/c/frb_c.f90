@@ -1,0 +1,390 @@
+!> The C interface, described in frb.h: bodies and motions are values of fixed size in the caller's memory,
+!> every refusal is a status, nothing stops or prints. No name here may be that of a module: a bind(C) name is
+!> global as those are, and gfortran takes one for the other without a word.
+module frb_c
+    use frb_flow_bodies, only: flow_many
+    use frb_flow_one, only: flow_body
+    use frb_free_flow, only: rigid_body
+    use frb_free_motion, only: free_motion
+    use frb_inertia, only: body_core, core_from_moments, core_from_tensor
+    use frb_status, only: status_message, status_ok, status_bad_moments, status_bad_tensor, &
+        status_bad_momentum, status_bad_attitude, status_bad_time, status_bad_count
+    use frb_release, only: version
+    use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_int, c_loc, &
+        c_null_char, c_ptr, c_size_t
+    implicit none
+    private
+
+    public :: usable, triple, quadruple
+
+    !> Sizes of the opaque types of frb.h, in doubles.
+    integer, parameter :: body_doubles = 30, motion_doubles = 45
+    !> Bodies gathered at a time where memory has other strides than the library.
+    integer, parameter :: chunk = 64
+
+    !> What pointers of C point to.
+    type, bind(c) :: triple
+        real(c_double) :: x(3)
+    end type triple
+
+    type, bind(c) :: quadruple
+        real(c_double) :: x(4)
+    end type quadruple
+
+    type, bind(c) :: matrix
+        real(c_double) :: x(3, 3)
+    end type matrix
+
+    !> A motion that was made here bears the seal: memory that C never set does not.
+    integer(c_int), parameter :: seal_of_motions = 1713044275_c_int
+    type :: sealed_motion
+        integer(c_int) :: seal = seal_of_motions
+        type(free_motion) :: motion
+    end type sealed_motion
+
+contains
+
+    !> A body from its principal moments.
+    function c_body_from_moments(moments, body) bind(c, name='frb_body_from_moments') result(stat)
+        type(c_ptr), value :: moments, body
+        integer(c_int) :: stat
+        type(triple), pointer :: three
+        type(body_core), pointer :: core
+
+        stat = status_bad_moments
+        if (.not. (c_associated(moments) .and. c_associated(body))) return
+        call c_f_pointer(moments, three)
+        call c_f_pointer(body, core)
+        core = core_from_moments(three%x)
+        stat = core%status
+    end function c_body_from_moments
+
+    !> A body from its inertia tensor, which is symmetric: rows and columns may change places.
+    function c_body_from_tensor(tensor, body) bind(c, name='frb_body_from_tensor') result(stat)
+        type(c_ptr), value :: tensor, body
+        integer(c_int) :: stat
+        type(matrix), pointer :: nine
+        type(body_core), pointer :: core
+
+        stat = status_bad_tensor
+        if (.not. (c_associated(tensor) .and. c_associated(body))) return
+        call c_f_pointer(tensor, nine)
+        call c_f_pointer(body, core)
+        core = core_from_tensor(nine%x)
+        stat = core%status
+    end function c_body_from_tensor
+
+    !> Moments of a body, and its principal axes when asked for.
+    function c_body_axes(body, moments, axes) bind(c, name='frb_body_axes') result(stat)
+        type(c_ptr), value :: body, moments, axes
+        integer(c_int) :: stat
+        type(body_core), pointer :: core
+        type(triple), pointer :: three
+        type(matrix), pointer :: nine
+
+        stat = status_bad_moments
+        if (.not. (c_associated(body) .and. c_associated(moments))) return
+        call c_f_pointer(body, core)
+        if (.not. usable(core)) return
+        stat = core%status
+        call c_f_pointer(moments, three)
+        three%x = core%moments
+        if (.not. c_associated(axes)) return
+        call c_f_pointer(axes, nine)
+        ! C stores row after row.
+        nine%x = transpose(core%axes)
+    end function c_body_axes
+
+    !> The flow of one body.
+    function c_flow(body, h, m, q) bind(c, name='frb_flow') result(stat)
+        type(c_ptr), value :: body, m, q
+        real(c_double), value :: h
+        integer(c_int) :: stat
+        type(body_core), pointer :: core
+        type(triple), pointer :: m3
+        type(quadruple), pointer :: q4
+
+        stat = status_bad_moments
+        if (.not. c_associated(body)) return
+        call c_f_pointer(body, core)
+        if (.not. usable(core)) return
+        stat = status_bad_momentum
+        if (.not. c_associated(m)) return
+        call c_f_pointer(m, m3)
+        if (c_associated(q)) then
+            call c_f_pointer(q, q4)
+            call flow_body(core, h, m3%x, stat, q4%x)
+        else
+            call flow_body(core, h, m3%x, stat)
+        end if
+    end function c_flow
+
+    !> The flow of n bodies.
+    function c_flow_many(body, ldb, h, n, m, ldm, q, ldq) bind(c, name='frb_flow_many') result(stat)
+        type(c_ptr), value :: body, m, q
+        integer(c_size_t), value :: ldb, n, ldm, ldq
+        real(c_double), value :: h
+        integer(c_int) :: stat
+        type(body_core), pointer :: core(:)
+        real(c_double), pointer, contiguous :: words(:, :), m_of(:, :), q_of(:, :)
+        integer :: bodies
+        logical :: packed
+
+        stat = status_bad_moments
+        if (.not. c_associated(body)) return
+        stat = status_bad_count
+        if (.not. (in_range(n, 0) .and. in_range(ldm, 3))) return
+        if (ldb /= 0 .and. .not. in_range(ldb, body_doubles)) return
+        if (c_associated(q) .and. .not. in_range(ldq, 4)) return
+        stat = status_ok
+        if (n == 0) return
+        stat = status_bad_momentum
+        if (.not. c_associated(m)) return
+        call c_f_pointer(m, m_of, [ldm, n])
+        nullify (q_of)
+        if (c_associated(q)) call c_f_pointer(q, q_of, [ldq, n])
+        bodies = merge(1, int(n), ldb == 0)
+        packed = (ldb == 0 .or. ldb == body_doubles) .and. ldm == 3
+        if (c_associated(q)) packed = packed .and. ldq == 4
+        if (packed) then
+            call c_f_pointer(body, core, [bodies])
+            packed = all_usable(core)
+        end if
+        if (packed) then
+            call flow_many(core, bodies, h, int(n), m_of, stat, q_of)
+        else
+            call c_f_pointer(body, words, [max(ldb, int(body_doubles, c_size_t)), int(bodies, c_size_t)])
+            call flow_strided(words, h, m_of, stat, q_of)
+        end if
+    end function c_flow_many
+
+    !> The same where bodies or states stand further apart, or bodies were not made: chunk after chunk is
+    !> gathered.
+    subroutine flow_strided(words, h, m, code, q)
+        real(c_double), intent(in), target :: words(:, :)   !! bodies: one, or as many as states
+        real(c_double), intent(in) :: h
+        real(c_double), intent(inout) :: m(:, :)            !! the first 3 rows
+        integer, intent(out) :: code
+        real(c_double), intent(inout), optional :: q(:, :)  !! the first 4 rows
+        type(body_core), pointer :: one
+        type(body_core) :: near(chunk)
+        real(c_double) :: near_m(3, chunk), near_q(4, chunk)
+        integer :: first, last, count, bodies, code_here, i
+
+        code = status_ok
+        bodies = 1
+        do first = 1, size(m, 2), chunk
+            last = min(first + chunk - 1, size(m, 2))
+            count = last - first + 1
+            if (size(words, 2) > 1 .or. first == 1) then
+                bodies = min(count, size(words, 2))
+                do i = 1, bodies
+                    call c_f_pointer(c_loc(words(1, first + i - 1)), one)
+                    near(i) = body_core()
+                    if (usable(one)) near(i) = one
+                end do
+            end if
+            near_m(:, :count) = m(:3, first:last)
+            if (present(q)) then
+                near_q(:, :count) = q(:4, first:last)
+                call flow_many(near, bodies, h, count, near_m, code_here, near_q)
+                q(:4, first:last) = near_q(:, :count)
+            else
+                call flow_many(near, bodies, h, count, near_m, code_here)
+            end if
+            m(:3, first:last) = near_m(:, :count)
+            code = max(code, code_here)
+        end do
+    end subroutine flow_strided
+
+    !> Sets up a free motion.
+    function c_motion_start(body, m, q, motion) bind(c, name='frb_motion_start') result(stat)
+        type(c_ptr), value :: body, m, q, motion
+        integer(c_int) :: stat
+        type(body_core), pointer :: core
+        type(rigid_body), pointer :: whole_body
+        type(triple), pointer :: m3
+        type(quadruple), pointer :: q4
+        type(sealed_motion), pointer :: sealed
+
+        stat = status_bad_count
+        if (.not. c_associated(motion)) return
+        call c_f_pointer(motion, sealed)
+        sealed%seal = 0
+        stat = status_bad_moments
+        if (.not. c_associated(body)) return
+        call c_f_pointer(body, core)
+        if (.not. usable(core)) return
+        stat = status_bad_momentum
+        if (.not. c_associated(m)) return
+        stat = status_bad_attitude
+        if (.not. c_associated(q)) return
+        call c_f_pointer(body, whole_body)
+        call c_f_pointer(m, m3)
+        call c_f_pointer(q, q4)
+        sealed%motion = free_motion(whole_body, m3%x, q4%x)
+        sealed%seal = seal_of_motions
+        stat = sealed%motion%status
+    end function c_motion_start
+
+    !> The state at n times.
+    function c_motion_at(motion, n, t, m, ldm, q, ldq) bind(c, name='frb_motion_at') result(stat)
+        type(c_ptr), value :: motion, t, m, q
+        integer(c_size_t), value :: n, ldm, ldq
+        integer(c_int) :: stat
+        type(sealed_motion), pointer :: sealed
+        real(c_double), pointer, contiguous :: t_of(:), m_of(:, :), q_of(:, :)
+        integer :: i, code
+
+        stat = status_of(motion, sealed)
+        if (stat /= status_ok) return
+        stat = status_bad_count
+        if (.not. (in_range(n, 0) .and. in_range(ldm, 3))) return
+        if (c_associated(q) .and. .not. in_range(ldq, 4)) return
+        stat = status_ok
+        if (n == 0) return
+        stat = status_bad_time
+        if (.not. c_associated(t)) return
+        stat = status_bad_momentum
+        if (.not. c_associated(m)) return
+        call c_f_pointer(t, t_of, [n])
+        call c_f_pointer(m, m_of, [ldm, n])
+        if (c_associated(q)) call c_f_pointer(q, q_of, [ldq, n])
+        stat = status_ok
+        do i = 1, int(n)
+            if (c_associated(q)) then
+                call sealed%motion%at(t_of(i), m_of(:3, i), q_of(:4, i), code)
+            else
+                call sealed%motion%at(t_of(i), m_of(:3, i), stat=code)
+            end if
+            stat = max(stat, code)
+        end do
+    end function c_motion_at
+
+    !> Period of the momentum, and the precession in it.
+    function c_motion_period(motion, period, precession) bind(c, name='frb_motion_period') result(stat)
+        type(c_ptr), value :: motion, period, precession
+        integer(c_int) :: stat
+        type(sealed_motion), pointer :: sealed
+        real(c_double), pointer :: number
+
+        stat = status_of(motion, sealed)
+        if (stat /= status_ok) return
+        if (c_associated(period)) then
+            call c_f_pointer(period, number)
+            number = sealed%motion%period()
+        end if
+        if (c_associated(precession)) then
+            call c_f_pointer(precession, number)
+            number = sealed%motion%precession()
+        end if
+    end function c_motion_period
+
+    !> The text of a status.
+    function c_status_message(code, text, size) bind(c, name='frb_status_message') result(length)
+        integer(c_int), value :: code
+        type(c_ptr), value :: text
+        integer(c_size_t), value :: size
+        integer(c_size_t) :: length
+
+        length = copied(status_message(int(code)), text, size)
+    end function c_status_message
+
+    !> The version of the library.
+    function c_version(text, size) bind(c, name='frb_version') result(length)
+        type(c_ptr), value :: text
+        integer(c_size_t), value :: size
+        integer(c_size_t) :: length
+
+        length = copied(version, text, size)
+    end function c_version
+
+    !> Bytes of a body: those of frb.h, or this does not compile.
+    pure function c_body_bytes() bind(c, name='frb_body_bytes') result(bytes)
+        integer(c_size_t) :: bytes
+        type(rigid_body) :: body
+        integer, parameter :: one = 1/merge(1, 0, storage_size(body) == 64*body_doubles)
+
+        bytes = one*8*body_doubles
+    end function c_body_bytes
+
+    !> Bytes of a motion: those of frb.h, or this does not compile.
+    pure function c_motion_bytes() bind(c, name='frb_motion_bytes') result(bytes)
+        integer(c_size_t) :: bytes
+        type(sealed_motion) :: motion
+        integer, parameter :: one = 1/merge(1, 0, storage_size(motion) == 64*motion_doubles)
+
+        bytes = one*8*motion_doubles
+    end function c_motion_bytes
+
+    !> Whether memory holds a body, made or refused: what C never set has no order of the axes.
+    pure function usable(core) result(yes)
+        type(body_core), intent(in) :: core
+        logical :: yes
+
+        yes = core%status >= status_ok .and. is_axis(core%order(1)) .and. is_axis(core%order(2)) &
+            .and. is_axis(core%order(3))
+        if (yes .and. core%status == status_ok) yes = core%a(3) > 0.0_c_double
+    end function usable
+
+    pure function is_axis(i) result(yes)
+        integer(c_int), intent(in) :: i
+        logical :: yes
+
+        yes = i >= 1 .and. i <= 3
+    end function is_axis
+
+    !> Whether all of them are usable.
+    pure function all_usable(core) result(yes)
+        type(body_core), intent(in) :: core(:)
+        logical :: yes
+        integer :: i
+
+        yes = .true.
+        do i = 1, size(core)
+            yes = yes .and. usable(core(i))
+        end do
+    end function all_usable
+
+    !> Whether a size is at least what it must be and no more than the library counts to.
+    pure function in_range(number, least) result(yes)
+        integer(c_size_t), intent(in) :: number
+        integer, intent(in) :: least
+        logical :: yes
+
+        yes = number >= least .and. number < huge(least) - chunk
+    end function in_range
+
+    !> `status_ok` and the motion, or why it cannot be used.
+    function status_of(motion, sealed) result(stat)
+        type(c_ptr), intent(in) :: motion
+        type(sealed_motion), pointer, intent(out) :: sealed
+        integer :: stat
+
+        stat = status_bad_moments
+        nullify (sealed)
+        if (.not. c_associated(motion)) return
+        call c_f_pointer(motion, sealed)
+        if (sealed%seal == seal_of_motions) stat = sealed%motion%status
+    end function status_of
+
+    !> Puts a text into the caller's memory, ended by a null, as much as fits; gives its whole length.
+    function copied(text, memory, size) result(length)
+        character(*), intent(in) :: text
+        type(c_ptr), intent(in) :: memory
+        integer(c_size_t), intent(in) :: size
+        integer(c_size_t) :: length
+        character(kind=c_char), pointer :: letters(:)
+        integer :: i, count
+
+        length = len(text, c_size_t)
+        if (.not. c_associated(memory) .or. size < 1) return
+        count = int(min(length, size - 1))
+        call c_f_pointer(memory, letters, [count + 1])
+        do i = 1, count
+            letters(i) = text(i:i)
+        end do
+        letters(count + 1) = c_null_char
+    end function copied
+
+end module frb_c
