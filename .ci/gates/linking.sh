@@ -38,12 +38,6 @@ installed_library_serves_its_clients() {
     # A user's own short names: `use frb` without `only`.
     compile gfortran short_names test/clients/short_names.f90
     ./short_names
-    # The archive inside another shared object.
-    gcc -shared -fPIC $(pkg-config --cflags frb) -o plugin.so -Dmain=client_main test/clients/client.c \
-        "$here/lib/libfrb.a" $(pkg-config --static --libs-only-l frb | sed 's/-lfrb//')
-    echo 'int client_main(void); int main(void) { return client_main(); }' >host.c
-    gcc -o host host.c ./plugin.so
-    prints_the_same ./host
     shared_library_is_tidy
     "$here/bin/driver_example2" -o out2
     records out2 2 8

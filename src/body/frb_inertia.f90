@@ -57,12 +57,14 @@ contains
         real(wp), intent(in) :: moments(3)
         type(body_core) :: core
         real(wp) :: sorted(3)
+        integer :: order(3)
 
         ! Finite first: comparing a NaN would raise a floating-point exception.
         if (.not. all(ieee_is_finite(moments))) return
         if (any(moments < 0.0_wp)) return
-        call sorting_order(moments, core%order, core%parity)
-        sorted = moments(core%order)
+        call sorting_order(moments, order, core%parity)
+        core%order = int(order, c_int)
+        sorted = moments(order)
         if (sorted(2) < tiny(1.0_wp)) return
         if (sorted(1) <= 0.0_wp) then
             if (sorted(3) - sorted(2) > rank_tolerance*sorted(3)) return

@@ -97,9 +97,9 @@ contains
         integer :: l, i1, i2, i3
 
         ! Column of axis j in the block: the inverse of the sorting.
-        i1 = findloc_of(body(1)%order, 1)
-        i2 = findloc_of(body(1)%order, 2)
-        i3 = findloc_of(body(1)%order, 3)
+        i1 = findloc_of(int(body(1)%order), 1)
+        i2 = findloc_of(int(body(1)%order), 2)
+        i3 = findloc_of(int(body(1)%order), 3)
         do l = 1, lanes
             bodies%m(l, i1) = m(1, l)
             bodies%m(l, i2) = m(2, l)
