@@ -18,7 +18,7 @@ module frb_splitting
 
     !> Integrates one body, or n bodies that interact, over `nsteps` steps of size `h`, in place:
     !> `call integrate(body, scheme, scene, h, nsteps, m, q, observer, every, t, drift, compensated, rests,
-    !> stat)`.
+    !> joined, stat)`.
     !>
     !> For n bodies m is (3, n), q is (4, n), the body a scalar or body(n), scene and observer those of a
     !> group. `nsteps` is an integer of 32 or 64 bits; steps are counted in 64. Refused with `stat`, the state
@@ -36,7 +36,9 @@ module frb_splitting
     !> stopped, by its observer or its number of steps, and continued from m, q and t as they came back, ends
     !> with the same bits as one that is not; watching a run changes nothing either. A compensated run needs
     !> `rests` as well: (7), or (7, n) for a group, what m (1:3) and q (4:7) lack; zero at the start, kept up
-    !> to date. For that, steps are whole: a scheme that opens and closes with a drift (ABA) makes both.
+    !> to date. For that, steps are whole: a scheme that opens and closes with a drift (ABA) makes both, one
+    !> more than it needs in a chain of steps. `joined` makes the two between steps as one where no state is
+    !> shown: then the bits depend on which states are. It pays where torques are cheap.
     !>
     !> `compensated` carries the rounding error of every update of m and q over to the next one, and keeps |m|
     !> and the energy in every drift. It takes twice the time and pays in long runs: there energy,
@@ -71,7 +73,7 @@ contains
 
     !> n bodies that are alike.
     subroutine integrate_alike(body, scheme, scene, h, nsteps, m, q, observer, every, t, drift, &
-                      compensated, rests, stat)
+                      compensated, rests, joined, stat)
         type(rigid_body), intent(in) :: body
         type(splitting_scheme), intent(in) :: scheme
         class(group_scene), intent(inout) :: scene
@@ -84,15 +86,16 @@ contains
         class(body_drift), intent(in), optional :: drift
         logical, intent(in), optional :: compensated
         real(wp), contiguous, intent(inout), optional :: rests(:, :)
+        logical, intent(in), optional :: joined
         integer, intent(out), optional :: stat
 
         call integrate_group([body], scheme, scene, h, nsteps, m, q, observer, every, t, drift, &
-                      compensated, rests, stat)
+                      compensated, rests, joined, stat)
     end subroutine integrate_alike
 
     !> One body, steps counted by a shorter integer.
     subroutine integrate_body_int32(body, scheme, scene, h, nsteps, m, q, observer, every, t, drift, &
-                      compensated, rests, stat)
+                      compensated, rests, joined, stat)
         type(rigid_body), intent(in) :: body
         type(splitting_scheme), intent(in) :: scheme
         class(body_scene), intent(inout) :: scene
@@ -105,15 +108,16 @@ contains
         class(body_drift), intent(in), optional :: drift
         logical, intent(in), optional :: compensated
         real(wp), intent(inout), optional :: rests(7)
+        logical, intent(in), optional :: joined
         integer, intent(out), optional :: stat
 
         call integrate_body(body, scheme, scene, h, int(nsteps, int64), m, q, observer, every, t, drift, &
-                      compensated, rests, stat)
+                      compensated, rests, joined, stat)
     end subroutine integrate_body_int32
 
     !> n bodies that are alike, steps counted by a shorter integer.
     subroutine integrate_alike_int32(body, scheme, scene, h, nsteps, m, q, observer, every, t, drift, &
-                      compensated, rests, stat)
+                      compensated, rests, joined, stat)
         type(rigid_body), intent(in) :: body
         type(splitting_scheme), intent(in) :: scheme
         class(group_scene), intent(inout) :: scene
@@ -126,15 +130,16 @@ contains
         class(body_drift), intent(in), optional :: drift
         logical, intent(in), optional :: compensated
         real(wp), contiguous, intent(inout), optional :: rests(:, :)
+        logical, intent(in), optional :: joined
         integer, intent(out), optional :: stat
 
         call integrate_group([body], scheme, scene, h, int(nsteps, int64), m, q, observer, every, t, drift, &
-                      compensated, rests, stat)
+                      compensated, rests, joined, stat)
     end subroutine integrate_alike_int32
 
     !> n bodies, steps counted by a shorter integer.
     subroutine integrate_group_int32(body, scheme, scene, h, nsteps, m, q, observer, every, t, drift, &
-                      compensated, rests, stat)
+                      compensated, rests, joined, stat)
         type(rigid_body), intent(in) :: body(:)
         type(splitting_scheme), intent(in) :: scheme
         class(group_scene), intent(inout) :: scene
@@ -147,10 +152,11 @@ contains
         class(body_drift), intent(in), optional :: drift
         logical, intent(in), optional :: compensated
         real(wp), contiguous, intent(inout), optional :: rests(:, :)
+        logical, intent(in), optional :: joined
         integer, intent(out), optional :: stat
 
         call integrate_group(body, scheme, scene, h, int(nsteps, int64), m, q, observer, every, t, drift, &
-                      compensated, rests, stat)
+                      compensated, rests, joined, stat)
     end subroutine integrate_group_int32
 
 end module frb_splitting

@@ -8,8 +8,7 @@ module frb_splitting_many
     use frb_modified_kicks, only: angular_response, gradient_torque, turned
     use frb_rotations, only: cross, is_unit_quat
     use frb_schemes, only: splitting_scheme
-    use frb_splitting_plan, only: splitting_plan, check_run
-    use frb_splitting_run, only: splitting_run, run_steps, largest_momentum
+    use frb_splitting_plan, only: splitting_plan, run_basis, new_basis, check_run, next_time
     use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_count, status_bad_momentum, &
         status_bad_torque, status_not_offered, status_stopped
     use frb_torque, only: group_scene, group_observer, body_drift
@@ -22,7 +21,8 @@ module frb_splitting_many
 
     !> Momenta (3, n) and attitudes (4, n), what they lack and room for the turns in a compensated run, and
     !> all of it at the last whole step.
-    type, extends(splitting_run) :: group_run
+    type :: moving
+        type(run_basis) :: basis
         real(wp), allocatable :: m(:, :), q(:, :), tau(:, :)
         real(wp), allocatable :: m_rest(:, :), q_rest(:, :), m_new(:, :), turn(:, :)
         real(wp), allocatable :: kept_m(:, :), kept_q(:, :), kept_m_rest(:, :), kept_q_rest(:, :)
@@ -32,19 +32,13 @@ module frb_splitting_many
         class(group_scene), pointer :: scene => null()
         class(group_observer), pointer :: observer => null()
         class(body_drift), pointer :: drift => null()           !! null: the free flow, in a batch
-    contains
-        procedure :: stage => stage_of_group
-        procedure :: move => move_group
-        procedure :: keep => keep_group
-        procedure :: go_back => go_back_group
-        procedure :: show => show_group
-    end type group_run
+    end type moving
 
 contains
 
     !> n bodies, each with moments of its own.
     subroutine integrate_group(body, scheme, scene, h, nsteps, m, q, observer, every, t, drift, &
-                               compensated, rests, stat)
+                               compensated, rests, joined, stat)
         type(rigid_body), intent(in), target :: body(:)             !! n bodies, or one for all
         type(splitting_scheme), intent(in) :: scheme
         class(group_scene), intent(inout), target :: scene          !! the torques
@@ -58,9 +52,10 @@ contains
         class(body_drift), intent(in), optional, target :: drift    !! default: the free flow, in a batch
         logical, intent(in), optional :: compensated                !! default: .false.
         real(wp), contiguous, intent(inout), optional :: rests(:, :)    !! (7, n): what m and q lack; from 0
+        logical, intent(in), optional :: joined                     !! default: .false.
         integer, intent(out), optional :: stat                      !! status code
         type(splitting_plan) :: plan
-        type(group_run) :: run
+        type(moving) :: run
         real(wp) :: time
         integer :: body_status, code, spacing, i, n
 
@@ -74,12 +69,12 @@ contains
         if (code == status_ok) then
             n = size(m, 2)
             plan = splitting_plan(scheme, h)
+            run%basis = new_basis(scheme, plan, h, compensated, joined)
             run%m = m
             run%q = q
             allocate (run%tau(3, n), source=0.0_wp)
             allocate (run%kept_m(3, n), run%kept_q(4, n))
-            if (present(compensated)) run%compensated = compensated
-            if (run%compensated) then
+            if (run%basis%compensated) then
                 allocate (run%m_rest(3, n), run%m_new(3, n), run%q_rest(4, n), run%turn(4, n), source=0.0_wp)
                 allocate (run%kept_m_rest(3, n), run%kept_q_rest(4, n))
                 if (present(rests)) then
@@ -92,15 +87,14 @@ contains
             run%scene => scene
             if (present(observer)) run%observer => observer
             if (present(drift)) run%drift => drift
-            run%on_request = scheme%displaced
             if (scheme%has_modified_kicks()) then
                 allocate (run%n(3, n), run%g(3, n), run%other(3, n), run%q_turned(4, n), source=0.0_wp)
             end if
-            call run_steps(run, plan, h, nsteps, present(observer), spacing, time, code)
+            call run_steps(run, plan, h, nsteps, spacing, time, code)
             m = run%m
             q = run%q
             if (present(t)) t = time
-            if (present(rests) .and. run%compensated) then
+            if (present(rests) .and. run%basis%compensated) then
                 rests(1:3, :) = run%m_rest
                 rests(4:7, :) = run%q_rest
             end if
@@ -110,97 +104,87 @@ contains
         call conclude(code, 'integrate', stat)
     end subroutine integrate_group
 
-    subroutine stage_of_group(self, drift, time, kick, modified, code)
-        class(group_run), intent(inout) :: self
-        real(wp), intent(in) :: drift, time, kick, modified
-        integer, intent(out) :: code
-        integer :: i, refused
+    include 'splitting_steps.inc'
 
-        code = status_ok
-        if (abs(drift) > 0.0_wp) then
-            call advance_group(self, drift, code)
-            if (associated(self%drift)) then
-                call self%scene%agree(code)
-                if (code /= status_ok) return
-            end if
+    !> The torques, and whether they are finite and their kicks do not overflow.
+    subroutine ask_torque(run, time, code)
+        type(moving), intent(inout) :: run
+        real(wp), intent(in) :: time
+        integer, intent(out) :: code
+
+        call run%scene%torques(run%q, time, run%tau, code)
+        if (code == status_ok) then
+            if (.not. all_below(run%tau, run%basis%largest_torque)) code = status_bad_torque
         end if
-        if (.not. self%torque_known) then
-            ! Also where the free flow has refused, which leaves q valid: others may take part in the torque.
-            call self%scene%torques(self%q, time, self%tau, refused)
-            if (code == status_ok) code = refused
-            if (code == status_ok) then
-                if (.not. (all_below(self%tau, self%largest_torque) &
-                           .and. all_below(self%m, largest_momentum))) code = status_bad_torque
-            end if
-            call self%scene%agree(code)
-            if (code == status_ok .and. abs(modified) > 0.0_wp) then
-                call add_gradients(self, time, kick, modified, code)
-                call self%scene%agree(code)
-            end if
-            if (code /= status_ok) return
-            self%torque_known = .true.
-        end if
-        if (self%compensated) then
-            do i = 1, size(self%tau, 2)
-                call kick_state(kick, self%tau(:, i), self%m(:, i), self%m_rest(:, i))
+    end subroutine ask_torque
+
+    !> m + amount tau + modified g.
+    pure subroutine kick(run, amount, modified)
+        type(moving), intent(inout) :: run
+        real(wp), intent(in) :: amount, modified
+        integer :: i
+
+        if (run%basis%compensated) then
+            do i = 1, size(run%tau, 2)
+                call kick_state(amount, run%tau(:, i), run%m(:, i), run%m_rest(:, i))
                 if (abs(modified) > 0.0_wp) then
-                    call kick_state(modified, self%g(:, i), self%m(:, i), self%m_rest(:, i))
+                    call kick_state(modified, run%g(:, i), run%m(:, i), run%m_rest(:, i))
                 end if
             end do
         else
-            self%m(:, :) = self%m + kick*self%tau
-            if (abs(modified) > 0.0_wp) self%m(:, :) = self%m + modified*self%g
+            run%m(:, :) = run%m + amount*run%tau
+            if (abs(modified) > 0.0_wp) run%m(:, :) = run%m + modified*run%g
         end if
-    end subroutine stage_of_group
+    end subroutine kick
 
     !> The torques g of a modified kick, as for one body: all bodies turn at a time.
-    subroutine add_gradients(self, time, kick, modified, code)
-        class(group_run), intent(inout) :: self
+    subroutine ask_gradient(run, time, kick, modified, code)
+        type(moving), intent(inout) :: run
         real(wp), intent(in) :: time, kick, modified
         integer, intent(out) :: code
         integer :: i, refused
 
-        do i = 1, size(self%tau, 2)
-            self%n(:, i) = angular_response(self%core(min(i, size(self%core))), self%tau(:, i))
+        do i = 1, size(run%tau, 2)
+            run%n(:, i) = angular_response(run%core(min(i, size(run%core))), run%tau(:, i))
         end do
-        if (self%displaced == 0) then
-            call self%scene%torques_change(self%q, time, self%n, self%g, code)
-            if (code == status_not_offered) self%displaced = self%on_request
+        if (run%basis%displaced == 0) then
+            call run%scene%torques_change(run%q, time, run%n, run%g, code)
+            if (code == status_not_offered) run%basis%displaced = run%basis%on_request
         end if
-        if (self%displaced == 1) then
-            self%n(:, :) = (2*(modified/kick))*self%n
-            call turn_all(self, 1.0_wp)
-            call self%scene%torques(self%q_turned, time, self%other, code)
-        else if (self%displaced == 2) then
+        if (run%basis%displaced == 1) then
+            run%n(:, :) = (2*(modified/kick))*run%n
+            call turn_all(run, 1.0_wp)
+            call run%scene%torques(run%q_turned, time, run%other, code)
+        else if (run%basis%displaced == 2) then
             ! Both, whatever the first one says: others may take part in the torques.
-            call turn_all(self, self%reach)
-            call self%scene%torques(self%q_turned, time, self%g, code)
-            call turn_all(self, -self%reach)
-            call self%scene%torques(self%q_turned, time, self%other, refused)
+            call turn_all(run, run%basis%reach)
+            call run%scene%torques(run%q_turned, time, run%g, code)
+            call turn_all(run, -run%basis%reach)
+            call run%scene%torques(run%q_turned, time, run%other, refused)
             if (code == status_ok) code = refused
-            if (code == status_ok) self%g(:, :) = (self%g - self%other)/(2*self%reach)
+            if (code == status_ok) run%g(:, :) = (run%g - run%other)/(2*run%basis%reach)
         end if
         if (code /= status_ok) return
-        do i = 1, size(self%tau, 2)
-            if (self%displaced == 1) then
-                self%tau(:, i) = self%other(:, i) + cross(self%n(:, i), self%tau(:, i))
-                self%g(:, i) = 0.0_wp
+        do i = 1, size(run%tau, 2)
+            if (run%basis%displaced == 1) then
+                run%tau(:, i) = run%other(:, i) + cross(run%n(:, i), run%tau(:, i))
+                run%g(:, i) = 0.0_wp
             else
-                self%g(:, i) = gradient_torque(self%n(:, i), self%tau(:, i), self%g(:, i))
+                run%g(:, i) = gradient_torque(run%n(:, i), run%tau(:, i), run%g(:, i))
             end if
         end do
-        if (.not. (all_below(self%tau, self%largest_torque) &
-                   .and. all_below(self%g, self%largest_gradient))) code = status_bad_torque
-    end subroutine add_gradients
+        if (.not. (all_below(run%tau, run%basis%largest_torque) &
+                   .and. all_below(run%g, run%basis%largest_gradient))) code = status_bad_torque
+    end subroutine ask_gradient
 
     !> The attitudes turned by `reach` times n.
-    pure subroutine turn_all(self, reach)
-        class(group_run), intent(inout) :: self
+    pure subroutine turn_all(run, reach)
+        type(moving), intent(inout) :: run
         real(wp), intent(in) :: reach
         integer :: i
 
-        do i = 1, size(self%q, 2)
-            self%q_turned(:, i) = turned(self%q(:, i), reach*self%n(:, i))
+        do i = 1, size(run%q, 2)
+            run%q_turned(:, i) = turned(run%q(:, i), reach*run%n(:, i))
         end do
     end subroutine turn_all
 
@@ -222,97 +206,86 @@ contains
         end do
     end function all_below
 
-    !> A drift that closes a step.
-    subroutine move_group(self, h, code)
-        class(group_run), intent(inout) :: self
-        real(wp), intent(in) :: h
-        integer, intent(out) :: code
-
-        call advance_group(self, h, code)
-        call self%scene%agree(code)
-    end subroutine move_group
-
     !> The free bodies for a time h.
-    subroutine advance_group(self, h, code)
-        class(group_run), intent(inout) :: self
+    subroutine advance(run, h, code)
+        type(moving), intent(inout) :: run
         real(wp), intent(in) :: h
         integer, intent(out) :: code
         integer :: i
 
-        self%torque_known = .false.
-        if (.not. self%compensated) then
-            call advance_all(self, h, self%m, self%q, code)
+        if (.not. run%basis%compensated) then
+            call advance_all(run, h, run%m, run%q, code)
         else
-            self%m_new(:, :) = self%m
-            self%turn(1, :) = 1.0_wp
-            self%turn(2:4, :) = 0.0_wp
-            call advance_all(self, h, self%m_new, self%turn, code)
+            run%m_new(:, :) = run%m
+            run%turn(1, :) = 1.0_wp
+            run%turn(2:4, :) = 0.0_wp
+            call advance_all(run, h, run%m_new, run%turn, code)
             if (code == status_ok) then
-                do i = 1, size(self%m, 2)
-                    call turn_state(self%core(min(i, size(self%core))), self%turn(:, i), self%m(:, i), &
-                                    self%m_rest(:, i), self%q(:, i), self%q_rest(:, i))
+                do i = 1, size(run%m, 2)
+                    call turn_state(run%core(min(i, size(run%core))), run%turn(:, i), run%m(:, i), &
+                                    run%m_rest(:, i), run%q(:, i), run%q_rest(:, i))
                 end do
             end if
         end if
-        if (associated(self%drift) .and. code == status_ok) then
-            if (.not. all(ieee_is_finite(self%m))) code = status_bad_momentum
-            if (.not. all(ieee_is_finite(self%q))) code = status_bad_attitude
+        if (associated(run%drift) .and. code == status_ok) then
+            if (.not. all(ieee_is_finite(run%m))) code = status_bad_momentum
+            if (.not. all(ieee_is_finite(run%q))) code = status_bad_attitude
         end if
-    end subroutine advance_group
+    end subroutine advance
 
     !> All bodies, in place: the batch form of the free flow, or the user's drift one by one.
-    subroutine advance_all(self, h, m, q, code)
-        class(group_run), intent(in) :: self
+    subroutine advance_all(run, h, m, q, code)
+        type(moving), intent(in) :: run
         real(wp), intent(in) :: h
         real(wp), contiguous, intent(inout) :: m(:, :), q(:, :)
         integer, intent(out) :: code
         integer :: i
 
         code = status_ok
-        if (associated(self%drift)) then
+        if (associated(run%drift)) then
             do i = 1, size(m, 2)
-                call self%drift%advance(self%body(min(i, size(self%body))), h, m(:, i), q(:, i), code)
+                call run%drift%advance(run%body(min(i, size(run%body))), h, m(:, i), q(:, i), code)
                 if (code /= status_ok) return
             end do
         else
-            call flow_many(self%core, size(self%core), h, size(m, 2), m, code, q)
+            call flow_many(run%core, size(run%core), h, size(m, 2), m, code, q)
         end if
     end subroutine advance_all
 
-    subroutine keep_group(self)
-        class(group_run), intent(inout) :: self
+    subroutine keep(run)
+        type(moving), intent(inout) :: run
 
-        self%kept_m(:, :) = self%m
-        self%kept_q(:, :) = self%q
-        if (self%compensated) then
-            self%kept_m_rest(:, :) = self%m_rest
-            self%kept_q_rest(:, :) = self%q_rest
+        run%kept_m(:, :) = run%m
+        run%kept_q(:, :) = run%q
+        if (run%basis%compensated) then
+            run%kept_m_rest(:, :) = run%m_rest
+            run%kept_q_rest(:, :) = run%q_rest
         end if
-    end subroutine keep_group
+    end subroutine keep
 
-    subroutine go_back_group(self)
-        class(group_run), intent(inout) :: self
+    subroutine go_back(run)
+        type(moving), intent(inout) :: run
 
-        self%m(:, :) = self%kept_m
-        self%q(:, :) = self%kept_q
-        if (self%compensated) then
-            self%m_rest(:, :) = self%kept_m_rest
-            self%q_rest(:, :) = self%kept_q_rest
+        run%m(:, :) = run%kept_m
+        run%q(:, :) = run%kept_q
+        if (run%basis%compensated) then
+            run%m_rest(:, :) = run%kept_m_rest
+            run%q_rest(:, :) = run%kept_q_rest
         end if
-    end subroutine go_back_group
+    end subroutine go_back
 
-    subroutine show_group(self, step, t, code)
-        class(group_run), intent(inout) :: self
+    subroutine show(run, step, t, code)
+        type(moving), intent(inout) :: run
         integer(int64), intent(in) :: step
         real(wp), intent(in) :: t
         integer, intent(out) :: code
         logical :: stop_here
 
         stop_here = .false.
-        call self%observer%observe(step, t, self%m, self%q, stop_here)
+        call run%observer%observe(step, t, run%m, run%q, stop_here)
         code = merge(status_stopped, status_ok, stop_here)
-        call self%scene%agree(code)
-    end subroutine show_group
+        call run%scene%agree(code)
+    end subroutine show
 
     !> Sizes and values of the state of a group.
     pure function check_group(bodies, m, q, rests) result(code)

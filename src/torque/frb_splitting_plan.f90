@@ -9,7 +9,7 @@ module frb_splitting_plan
     implicit none
     private
 
-    public :: splitting_plan, check_run, next_time
+    public :: splitting_plan, run_basis, new_basis, check_run, next_time
 
     !> h times coefficients, and start and end of a run: beyond it they could overflow.
     real(wp), parameter :: longest = 1.0e-7_wp*huge(1.0_wp)     ! coefficients are at most 1e6
@@ -44,6 +44,18 @@ module frb_splitting_plan
         real(wp), allocatable :: modified(:)    !! (stages): c h^3 of modified kicks, else 0
     end type splitting_plan
 
+    !> What a run is told, and limits that follow from it.
+    type :: run_basis
+        logical :: compensated = .false.
+        logical :: joined = .false.             !! two drifts between steps are one where nothing is shown
+        logical :: torque_known = .false.       !! nothing has moved since the last torque
+        real(wp) :: largest_torque = 0.0_wp     !! of a torque whose kicks do not overflow
+        real(wp) :: largest_gradient = 0.0_wp   !! the same of g, see frb_modified_kicks
+        real(wp) :: reach = 0.0_wp              !! displaced torques: turn by this times n
+        integer :: displaced = 0                !! how many of them; 0: the scene tells the change
+        integer :: on_request = 2               !! how many if it does not
+    end type run_basis
+
     interface splitting_plan
         module procedure plan_of_step
         module procedure plan_of_step_with_stat
@@ -52,7 +64,7 @@ module frb_splitting_plan
 contains
 
     !> The plan of a step of size h, of either sign. `status`: that of a scheme that could not be made;
-    !> `status_bad_time` for h zero, not finite or beyond 1e301.
+    !> `status_bad_time` for h zero, not finite or beyond 1e301 (1e100 with modified kicks).
     pure function plan_of_step(scheme, h) result(plan)
         type(splitting_scheme), intent(in) :: scheme
         real(wp), intent(in) :: h
@@ -61,7 +73,7 @@ contains
         integer :: i, s
 
         plan%status = scheme%status
-        if (plan%status == status_ok .and. .not. is_step(h)) plan%status = status_bad_time
+        if (plan%status == status_ok .and. .not. is_step(scheme, h)) plan%status = status_bad_time
         s = 0
         if (plan%status == status_ok) s = scheme%kicks
         plan%stages = s
@@ -93,13 +105,16 @@ contains
         stat = plan%status
     end function plan_of_step_with_stat
 
-    !> Whether h can be a step.
-    pure function is_step(h) result(good)
+    !> Whether h can be a step; h**3 must not overflow where there are modified kicks.
+    pure function is_step(scheme, h) result(good)
+        type(splitting_scheme), intent(in) :: scheme
         real(wp), intent(in) :: h
         logical :: good
+        real(wp), parameter :: longest_cubed = 1.0e100_wp
 
         good = ieee_is_finite(h)
         if (good) good = abs(h) > 0.0_wp .and. abs(h) <= longest
+        if (good .and. scheme%has_modified_kicks()) good = abs(h) <= longest_cubed
     end function is_step
 
     !> The time one step after t: t + (n + 1) h - n h rounded, n the steps from zero to t. It depends on t and
@@ -120,6 +135,23 @@ contains
             next = t + h
         end if
     end function next_time
+
+    !> The basis of a run of steps of size h.
+    pure function new_basis(scheme, plan, h, compensated, joined) result(basis)
+        type(splitting_scheme), intent(in) :: scheme
+        type(splitting_plan), intent(in) :: plan
+        real(wp), intent(in) :: h
+        logical, intent(in), optional :: compensated, joined
+        type(run_basis) :: basis
+        real(wp), parameter :: largest = 0.1_wp*huge(1.0_wp)
+
+        if (present(compensated)) basis%compensated = compensated
+        if (present(joined)) basis%joined = joined
+        basis%largest_torque = largest/max(1.0_wp, maxval(abs(plan%kick)))
+        basis%largest_gradient = largest/max(1.0_wp, maxval(abs(plan%modified)))
+        if (scheme%has_modified_kicks()) basis%reach = 0.25_wp*h*h
+        basis%on_request = scheme%displaced
+    end function new_basis
 
     !> What is common to every call: first thing that is wrong, and defaults.
     pure subroutine check_run(body_status, scheme, h, nsteps, spacing, start, code, every, t)
@@ -142,7 +174,7 @@ contains
         if (code == status_ok .and. (nsteps < 0 .or. spacing < 1)) code = status_bad_count
         if (code == status_ok) then
             code = status_bad_time
-            if (is_step(h) .and. ieee_is_finite(start)) then
+            if (is_step(scheme, h) .and. ieee_is_finite(start)) then
                 if (abs(h) <= longest/max(nsteps, 1_int64) .and. abs(start) <= longest) code = status_ok
             end if
         end if
