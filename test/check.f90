@@ -38,6 +38,9 @@ program check
     use frb_test_flow_batches, only: test_flow_batches
     use frb_test_flow_series, only: test_flow_series
     use frb_test_status, only: test_status, stop_in_the_library
+    use frb_test_tangent, only: test_tangent
+    use frb_test_tangent_laws, only: test_tangent_laws
+    use frb_test_tangent_duals, only: test_tangent_duals
     implicit none
 
     !> What is done with each suite: its name is looked for among the arguments, or written, or it runs.
@@ -101,6 +104,9 @@ contains
         call suite(task, 'flow-runs', test_flow_runs)
         call suite(task, 'flow-batches', test_flow_batches)
         call suite(task, 'flow-series', test_flow_series)
+        call suite(task, 'tangent', test_tangent)
+        call suite(task, 'tangent-laws', test_tangent_laws)
+        call suite(task, 'tangent-duals', test_tangent_duals)
         call suite(task, 'published', test_published)
         call suite(task, '--fail', fail)
         call suite(task, '--stop', stop_in_the_library)

@@ -169,6 +169,8 @@ contains
                 call dsyev('V', 'L', 3_int32, axes, 3_int32, moments, work, size(work, kind=int32), info)
                 moments = moments*largest
                 axes(:, 3) = cross(axes(:, 1), axes(:, 2))
+                ! Orthogonal to rounding: LAPACK leaves a few units more.
+                axes = axes + 0.5_wp*matmul(axes, identity - matmul(transpose(axes), axes))
                 if (info /= 0) code = status_lapack_failed
             end if
             if (code == status_ok) call settle_rank(moments, code)

@@ -170,51 +170,6 @@ contains
         q(1 + i3) = body%parity*q3
     end subroutine flow_one
 
-    !> sin(x)/x and cos(x) - 1 from xx = x^2 <= tiny_turn_limit, to rounding.
-    pure subroutine tiny_turn(xx, sinc, cosm1)
-        real(wp), intent(in) :: xx
-        real(wp), intent(out) :: sinc, cosm1
-
-        sinc = (1 - xx*(1/6.0_wp)) + (xx*xx)*(1/120.0_wp - xx*(1/5040.0_wp))
-        cosm1 = (xx*xx)*((1/24.0_wp - xx*(1/720.0_wp)) + (xx*xx)*(1/40320.0_wp)) - 0.5_wp*xx
-    end subroutine tiny_turn
-
-    !> sin(x)/x and cos(x) - 1 from xx = x^2 <= middle_turn_limit, to rounding.
-    pure subroutine middle_turn(xx, sinc, cosm1)
-        real(wp), intent(in) :: xx
-        real(wp), intent(out) :: sinc, cosm1
-        real(wp) :: x4, x8
-
-        x4 = xx*xx
-        x8 = x4*x4
-        sinc = (((1 - xx*(1/6.0_wp)) + x4*(1/120.0_wp - xx*(1/5040.0_wp))) &
-                + x8*((1/362880.0_wp - xx*(1/39916800.0_wp)) &
-                      + x4*(1/6227020800.0_wp - xx*(1/1307674368000.0_wp)))) &
-               + (x8*x8)*(1/355687428096000.0_wp)
-        cosm1 = x4*(((1/24.0_wp - xx*(1/720.0_wp)) + x4*(1/40320.0_wp - xx*(1/3628800.0_wp))) &
-                    + x8*((1/479001600.0_wp - xx*(1/87178291200.0_wp)) + x4*(1/20922789888000.0_wp))) &
-                - 0.5_wp*xx
-    end subroutine middle_turn
-
-    !> As short_norm, for steps of middle length.
-    pure function middle_norm(square) result(change)
-        real(wp), intent(in) :: square
-        real(wp) :: change
-        real(wp) :: root
-
-        root = sqrt(1 + square)
-        change = -square/(root*(1 + root))
-    end function middle_norm
-
-    !> First terms of short_norm.
-    pure function tiny_norm(square) result(change)
-        real(wp), intent(in) :: square
-        real(wp) :: change
-
-        change = (square*square)*((3/8.0_wp - square*(5/16.0_wp)) + (square*square)*(35/128.0_wp)) &
-                 - 0.5_wp*square
-    end function tiny_norm
-
     !> flow_one for a body whose own axes are not principal, and for a linear rotor, whose constants are those
     !> of a sphere and hold in any axes. Otherwise the momentum is taken to principal axes, and only
     !> the increments are taken back, so that no rounding of the rotation gathers over many steps.
@@ -324,5 +279,7 @@ contains
     include 'middle_formulas.inc'
 
     include 'turn_formulas.inc'
+
+    include 'reach_formulas.inc'
 
 end module frb_flow_one

@@ -30,7 +30,7 @@ module frb_free_flow
     implicit none
     private
 
-    public :: rigid_body, free_flow, core_of
+    public :: rigid_body, free_flow, flow_tangent, core_of
 
     !> A rigid body: `body = rigid_body(moments)` or `body = rigid_body(tensor)`. Its components are private,
     !> so that all routines see the same body; the functions below read it.
@@ -78,6 +78,62 @@ module frb_free_flow
         module procedure flow_momenta_of_bodies
         module procedure flow_quaternions_of_bodies
     end interface free_flow
+
+    !> Advances the state of one body or of n equal bodies by h, in place, with its exact derivatives:
+    !>
+    !>     call flow_tangent(body, h, m, jacobian [, stat])
+    !>     call flow_tangent(body, h, m, q, transition [, stat])
+    !>     call flow_tangent(body, h, m, q, transition, by_moments [, stat])
+    !>     call flow_tangent(body, h, m, q, transition, by_tensor=by_tensor [, stat=stat])
+    !>
+    !> What they are, and how accurate: see frb_flow_tangent.
+    interface flow_tangent
+        !> The momentum alone: no attitude cost.
+        module subroutine tangent_of_momentum(body, h, m, jacobian, stat)
+            implicit none
+            type(rigid_body), intent(in) :: body
+            real(wp), intent(in) :: h                       !! time, any sign
+            real(wp), intent(inout) :: m(3)                 !! body angular momentum
+            real(wp), intent(out) :: jacobian(3, 3)         !! J: dm' = J dm
+            integer, intent(out), optional :: stat
+        end subroutine tangent_of_momentum
+
+        !> Momentum and attitude.
+        module subroutine tangent_of_state(body, h, m, q, transition, stat)
+            implicit none
+            type(rigid_body), intent(in) :: body
+            real(wp), intent(in) :: h                       !! time, any sign
+            real(wp), intent(inout) :: m(3)                 !! body angular momentum
+            real(wp), intent(inout) :: q(4)                 !! attitude, scalar first, body to space; not zero
+            real(wp), intent(out) :: transition(6, 6)       !! [J 0; W E] on (dm, dtheta)
+            integer, intent(out), optional :: stat
+        end subroutine tangent_of_state
+
+        !> The same with the derivatives of (m', theta') by the inertia.
+        module subroutine tangent_and_inertia(body, h, m, q, transition, by_moments, stat)
+            implicit none
+            type(rigid_body), intent(in) :: body
+            real(wp), intent(in) :: h
+            real(wp), intent(inout) :: m(3), q(4)
+            real(wp), intent(out) :: transition(6, 6)
+            !> (6, 3): by the principal moments, in the order of `body%moments()`, axes held. (6, 6): by the
+            !> elements of the tensor, see by_tensor. `status_bad_count` for any other shape.
+            real(wp), intent(out), contiguous :: by_moments(:, :)
+            integer, intent(out), optional :: stat
+        end subroutine tangent_and_inertia
+
+        !> The same by the elements of the inertia tensor in the axes of the body.
+        module subroutine tangent_and_tensor(body, h, m, q, transition, stat, by_tensor)
+            implicit none
+            type(rigid_body), intent(in) :: body
+            real(wp), intent(in) :: h
+            real(wp), intent(inout) :: m(3), q(4)
+            real(wp), intent(out) :: transition(6, 6)
+            integer, intent(out), optional :: stat
+            !> By the elements 11, 22, 33, 12, 13, 23; the last three change both of their places.
+            real(wp), intent(out) :: by_tensor(6, 6)
+        end subroutine tangent_and_tensor
+    end interface flow_tangent
 
 contains
 

@@ -1,0 +1,305 @@
+!> The free flow of any body with its derivative: refusals, extreme exponents, axes of a tensor, and the
+!> motion that has settled on the unstable axis, around the steps of frb_flow_tangent_one and
+!> frb_flow_tangent_long.
+module frb_flow_tangent_body
+    use frb_flow_limits, only: plain_largest, plain_smallest
+    use frb_flow_tangent_axis, only: follow_axis
+    use frb_flow_tangent_inertia, only: inertia_columns, elements_in_axes
+    use frb_flow_tangent_long, only: long_tangent
+    use frb_flow_tangent_one, only: short_tangent
+    use frb_flow_tangent_parts, only: step_parts
+    use frb_inertia, only: body_core, keep_off_axis
+    use frb_kinds, only: wp
+    use frb_status, only: status_ok, status_bad_momentum, status_bad_attitude, status_bad_time
+    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+    use, intrinsic :: iso_fortran_env, only: int64
+    implicit none
+    private
+
+    public :: tangent_body
+
+    real(wp), parameter :: largest_square_angle = 1.0e40_wp
+
+contains
+
+    !> Advances m, and q when present, of any body by h, with `transition` and, if wanted, the derivatives by
+    !> the inertia (6, 3) or (6, 6); without q, with `jacobian`. code says why the input was refused, if it
+    !> was: it is then left alone, and the derivatives are those of no step.
+    pure recursive subroutine tangent_body(body, h, m, code, elements, q, transition, jacobian, by_inertia)
+        type(body_core), intent(in) :: body
+        real(wp), intent(in) :: h
+        real(wp), intent(inout) :: m(3)
+        integer, intent(out) :: code
+        integer, intent(in) :: elements     !! of the inertia, by which to differentiate: 0, 3 or 6
+        real(wp), intent(inout), optional :: q(4)
+        real(wp), intent(inout), optional :: transition(6, 6)
+        real(wp), intent(inout), optional :: jacobian(3, 3)
+        real(wp), intent(inout), optional :: by_inertia(6, elements)
+        integer(int64) :: smallest, largest
+        real(wp) :: rate
+        logical :: plain
+
+        code = body%status
+        smallest = max(magnitude(m(1)), magnitude(m(2)), magnitude(m(3)))
+        largest = max(smallest, magnitude(h), magnitude(body%a(1)))
+        if (present(q)) then
+            largest = max(largest, magnitude(q(1)), magnitude(q(2)), magnitude(q(3)), magnitude(q(4)))
+            smallest = min(smallest, max(magnitude(q(1)), magnitude(q(2)), magnitude(q(3)), magnitude(q(4))))
+        end if
+        plain = are_plain(smallest, largest) .and. code == status_ok .and. .not. body%needs_rotation
+        if (plain) then
+            rate = body%a(1)*h
+            plain = abs(rate) < plain_largest .and. abs(h) > 0.0_wp
+            if (plain) plain = rate*rate*(m(1)*m(1) + m(2)*m(2) + m(3)*m(3)) <= largest_square_angle
+        end if
+        if (plain) then
+            call tangent_plain(body, h, m, elements, q, transition, jacobian, by_inertia)
+            return
+        end if
+        if (code == status_ok) code = refusal(h, m, q)
+        if (code /= status_ok) then
+            call no_step(elements, q, transition, jacobian, by_inertia)
+        else if (body%needs_rotation) then
+            call tangent_turned(body, h, m, code, elements, q, transition, jacobian, by_inertia)
+        else if (maxval(abs(m)) <= 0.0_wp .or. abs(h) <= 0.0_wp) then
+            call no_step(elements, q, transition, jacobian, by_inertia)
+            if (present(transition)) call turns_from_rest(body, h, transition)
+        else
+            call tangent_rescaled(body, h, m, elements, q, transition, jacobian, by_inertia)
+        end if
+    end subroutine tangent_body
+
+    !> Why numbers are refused.
+    pure function refusal(h, m, q) result(code)
+        real(wp), intent(in) :: h, m(3)
+        real(wp), intent(in), optional :: q(4)
+        integer :: code
+
+        code = status_ok
+        if (.not. all(ieee_is_finite(m))) then
+            code = status_bad_momentum
+        else if (.not. ieee_is_finite(h)) then
+            code = status_bad_time
+        else if (present(q)) then
+            if (.not. all(ieee_is_finite(q))) then
+                code = status_bad_attitude
+            else if (maxval(abs(q)) <= 0.0_wp) then
+                code = status_bad_attitude
+            end if
+        end if
+    end function refusal
+
+    !> The derivatives of the identity.
+    pure subroutine no_step(elements, q, transition, jacobian, by_inertia)
+        integer, intent(in) :: elements
+        real(wp), intent(in), optional :: q(4)
+        real(wp), intent(inout), optional :: transition(6, 6)
+        real(wp), intent(inout), optional :: jacobian(3, 3)
+        real(wp), intent(inout), optional :: by_inertia(6, elements)
+        integer :: i
+
+        if (present(q)) then
+            transition = 0.0_wp
+            do i = 1, 6
+                transition(i, i) = 1.0_wp
+            end do
+            if (present(by_inertia)) by_inertia = 0.0_wp
+        else
+            jacobian = 0.0_wp
+            do i = 1, 3
+                jacobian(i, i) = 1.0_wp
+            end do
+        end if
+    end subroutine no_step
+
+    !> W = h I^-1, that of a body at rest, into `transition`.
+    pure subroutine turns_from_rest(body, h, transition)
+        type(body_core), intent(in) :: body
+        real(wp), intent(in) :: h
+        real(wp), intent(inout) :: transition(6, 6)
+        real(wp) :: a(3)
+        integer :: i
+
+        a(body%order) = body%a
+        do i = 1, 3
+            transition(3 + i, i) = h*a(i)
+        end do
+    end subroutine turns_from_rest
+
+    !> The step in principal axes, all numbers plain, m and h not zero.
+    pure subroutine tangent_plain(body, h, m, elements, q, transition, jacobian, by_inertia)
+        type(body_core), intent(in) :: body
+        real(wp), intent(in) :: h
+        real(wp), intent(inout) :: m(3)
+        integer, intent(in) :: elements
+        real(wp), intent(inout), optional :: q(4)
+        real(wp), intent(inout), optional :: transition(6, 6)
+        real(wp), intent(inout), optional :: jacobian(3, 3)
+        real(wp), intent(inout), optional :: by_inertia(6, elements)
+        type(step_parts) :: parts
+        real(wp) :: reached, rest
+        logical :: done
+
+        if (present(by_inertia)) then
+            call short_tangent(body, 0.5_wp*h, m, done, parts, q, transition)
+        else
+            call short_tangent(body, 0.5_wp*h, m, done, q=q, transition=transition, jacobian=jacobian)
+        end if
+        reached = 1.0_wp
+        rest = h
+        if (.not. done) then
+            call long_tangent(body, 0.5_wp*rest, m, reached, parts, q, transition, jacobian)
+            if (reached < 1.0_wp) then
+                rest = reached*h
+                call long_tangent(body, 0.5_wp*rest, m, reached, parts, q, transition, jacobian)
+                reached = 0.0_wp
+            end if
+        end if
+        if (body%parity < 0.0_wp) call reflect(body%order(3), transition, jacobian)
+        if (present(by_inertia)) call inertia_columns(body, parts, m, elements, by_inertia)
+        if (reached < 1.0_wp) call follow_axis(body, h - rest, m, elements, q, transition, jacobian, &
+                                               by_inertia)
+    end subroutine tangent_plain
+
+    !> Sorted axes are right-handed: an odd sorting turns the last one round.
+    pure subroutine reflect(axis, transition, jacobian)
+        integer, intent(in) :: axis
+        real(wp), intent(inout), optional :: transition(6, 6)
+        real(wp), intent(inout), optional :: jacobian(3, 3)
+
+        if (present(transition)) then
+            transition(axis, 1:3) = -transition(axis, 1:3)
+            transition(3 + axis, :) = -transition(3 + axis, :)
+            transition(:, axis) = -transition(:, axis)
+            transition(4:6, 3 + axis) = -transition(4:6, 3 + axis)
+        else
+            jacobian(axis, :) = -jacobian(axis, :)
+            jacobian(:, axis) = -jacobian(:, axis)
+        end if
+    end subroutine reflect
+
+    !> For a body whose own axes are not principal, or a linear rotor, which turns as a sphere but has no
+    !> momentum along its axis: momentum to principal axes, increments and derivatives back.
+    pure recursive subroutine tangent_turned(body, h, m, code, elements, q, transition, jacobian, by_inertia)
+        type(body_core), intent(in) :: body
+        real(wp), intent(in) :: h
+        real(wp), intent(inout) :: m(3)
+        integer, intent(out) :: code
+        integer, intent(in) :: elements     !! of the inertia, by which to differentiate: 0, 3 or 6
+        real(wp), intent(inout), optional :: q(4)
+        real(wp), intent(inout), optional :: transition(6, 6)
+        real(wp), intent(inout), optional :: jacobian(3, 3)
+        real(wp), intent(inout), optional :: by_inertia(6, elements)
+        type(body_core) :: principal
+        real(wp) :: n(3), old(3), change(4), w(3), w0
+
+        call keep_off_axis(body, m, code)
+        if (code /= status_ok) then
+            call no_step(elements, q, transition, jacobian, by_inertia)
+            return
+        end if
+        principal = body
+        principal%needs_rotation = .false.
+        old = matmul(m, body%axes)
+        n = old
+        if (.not. present(q)) then
+            call tangent_body(principal, h, n, code, 0, jacobian=jacobian)
+            m = m + matmul(body%axes, n - old)
+            jacobian = in_axes(body%axes, jacobian)
+            if (body%linear) call drop_axis(body%axis, jacobian)
+            return
+        end if
+        change = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+        call tangent_body(principal, h, n, code, elements, change, transition, by_inertia=by_inertia)
+        m = m + matmul(body%axes, n - old)
+        w = matmul(body%axes, change(2:4))
+        w0 = change(1) - 1
+        if (change(1) > 0.5_wp) w0 = -sum(w*w)/(1 + sqrt(1 - sum(w*w)))
+        q = q + [q(1)*w0 - (q(2)*w(1) + q(3)*w(2) + q(4)*w(3)), &
+                 q(1)*w(1) + q(2)*w0 + (q(3)*w(3) - q(4)*w(2)), &
+                 q(1)*w(2) + q(3)*w0 + (q(4)*w(1) - q(2)*w(3)), &
+                 q(1)*w(3) + q(4)*w0 + (q(2)*w(2) - q(3)*w(1))]
+        transition(1:3, 1:3) = in_axes(body%axes, transition(1:3, 1:3))
+        transition(4:6, 1:3) = matmul(body%axes, matmul(transition(4:6, 1:3), transpose(body%axes)))
+        transition(4:6, 4:6) = in_axes(body%axes, transition(4:6, 4:6))
+        if (body%linear) call drop_axis(body%axis, transition(:, 1:3))
+        if (.not. present(by_inertia)) return
+        by_inertia(1:3, :) = matmul(body%axes, by_inertia(1:3, :))
+        by_inertia(4:6, :) = matmul(body%axes, by_inertia(4:6, :))
+        if (elements == 6) by_inertia = matmul(by_inertia, elements_in_axes(body%axes))
+    end subroutine tangent_turned
+
+    !> R x R^T for columns R of axes, that of 1 being 1: a matrix close to 1 is so to all digits.
+    pure function in_axes(axes, x) result(y)
+        real(wp), intent(in) :: axes(3, 3), x(:, :)
+        real(wp) :: y(3, 3)
+        integer :: i
+
+        y = x
+        do i = 1, 3
+            y(i, i) = y(i, i) - 1
+        end do
+        y = matmul(axes, matmul(y, transpose(axes)))
+        do i = 1, 3
+            y(i, i) = y(i, i) + 1
+        end do
+    end function in_axes
+
+    !> Takes out of derivatives by the momentum what it has along an axis.
+    pure subroutine drop_axis(axis, derivatives)
+        real(wp), intent(in) :: axis(3)
+        real(wp), intent(inout) :: derivatives(:, :)
+        real(wp) :: along(size(derivatives, 1))
+        integer :: k
+
+        along = matmul(derivatives, axis)
+        do k = 1, 3
+            derivatives(:, k) = derivatives(:, k) - along*axis(k)
+        end do
+    end subroutine drop_axis
+
+    !> As flow_rescaled of frb_flow_one: momentum, moments and time scaled by powers of 2 to the middle of the
+    !> exponents, a time so long that no digit of any phase is left cut to where the arithmetic holds. J and E
+    !> have no unit; W goes as 1/m, dtheta' by the moments as their inverses.
+    pure subroutine tangent_rescaled(body, h, m, elements, q, transition, jacobian, by_inertia)
+        type(body_core), intent(in) :: body
+        real(wp), intent(in) :: h
+        real(wp), intent(inout) :: m(3)
+        integer, intent(in) :: elements
+        real(wp), intent(inout), optional :: q(4)
+        real(wp), intent(inout), optional :: transition(6, 6)
+        real(wp), intent(inout), optional :: jacobian(3, 3)
+        real(wp), intent(inout), optional :: by_inertia(6, elements)
+        integer, parameter :: cut = 64     ! angles of 2^64 and more have no phase
+        type(body_core) :: scaled
+        real(wp) :: time
+        integer :: em, ea, eq
+
+        em = exponent(maxval(abs(m)))
+        ea = exponent(body%a(1))
+        time = set_exponent(h, min(exponent(h) + em + ea, cut))
+        scaled = body
+        scaled%a = scale(body%a, -ea)
+        scaled%alpha = scale(body%alpha, -ea)
+        scaled%beta = scale(body%beta, -ea)
+        scaled%gamma = scale(body%gamma, -ea)
+        m = scale(m, -em)
+        eq = 0
+        if (present(q)) then
+            eq = exponent(maxval(abs(q)))
+            q = scale(q, -eq)
+        end if
+        call tangent_plain(scaled, time, m, elements, q, transition, jacobian, by_inertia)
+        m = scale(m, em)
+        if (.not. present(q)) return
+        q = scale(q, eq)
+        transition(4:6, 1:3) = scale(transition(4:6, 1:3), -em)
+        if (present(by_inertia)) then
+            by_inertia(1:3, :) = scale(by_inertia(1:3, :), em + ea)
+            by_inertia(4:6, :) = scale(by_inertia(4:6, :), ea)
+        end if
+    end subroutine tangent_rescaled
+
+    include 'plain_numbers.inc'
+
+end module frb_flow_tangent_body

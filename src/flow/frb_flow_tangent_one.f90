@@ -1,0 +1,239 @@
+!> The free flow of one body with its derivative, in its principal axes, for steps that the series reach;
+!> longer ones are in frb_flow_tangent_long. The step is that of frb_flow_one; see tangent_formulas.inc.
+module frb_flow_tangent_one
+    use frb_flow_limits, only: short_limit, tiny_limit, tiny_turn_limit, small_turn_limit, middle_limit, &
+        middle_turn_limit
+    use frb_flow_tangent_parts, only: step_parts
+    use frb_inertia, only: body_core
+    use frb_kinds, only: wp
+    implicit none
+    private
+
+    public :: short_tangent
+
+    !> How far a step reaches: which series it takes.
+    integer, parameter :: tiny_step = 1, short_step = 2, middle_step = 3, long_step = 4
+
+contains
+
+    !> Advances m, and q when present, by 2 t, and forms `transition`, or `jacobian` without q. `done` is
+    !> .false., and nothing is changed, when the series do not reach so far. m /= 0, everything plain.
+    pure subroutine short_tangent(body, t, m, done, parts, q, transition, jacobian)
+        type(body_core), intent(in) :: body
+        real(wp), intent(in) :: t
+        real(wp), intent(inout) :: m(3)
+        logical, intent(out) :: done
+        type(step_parts), intent(inout), optional :: parts  !! for derivatives by the inertia
+        real(wp), intent(inout), optional :: q(4)
+        real(wp), intent(inout), optional :: transition(6, 6)
+        real(wp), intent(inout), optional :: jacobian(3, 3)
+        type(step_parts) :: f
+        real(wp) :: x, v, x1, x2, x3, v1, v2, v3, over_w, over_gg, twice, k, psi
+        real(wp) :: r11, r12, r13, r22, r23, r33, j11, j12, j13, j21, j22, j23, j31, j32, j33
+        integer :: reach
+
+        call set_form(body, t, m, f, reach)
+        done = reach < long_step
+        if (.not. done) return
+        call set_series(f, reach)
+        call advance_momentum(f, m)
+        call short_gradients(f%a, f%b, f%g, f%m1, f%m2, f%m3, f%gg, f%p, f%r, f%nu, f%y, f%scd, f%aa, f%bb, &
+                             x, v, x1, x2, x3, v1, v2, v3, over_w, over_gg)
+        if (present(q)) then
+            call advance_attitude(f, reach, q, twice, transition)
+        else
+            twice = 2/(1 + (x*x + v*v))
+        end if
+        call turn_matrix(1.0_wp, x, v, twice, r11, r12, r13, r22, r23, r33)
+        x1 = twice*x1
+        x2 = twice*x2
+        x3 = twice*x3
+        v1 = twice*v1
+        v2 = twice*v2
+        v3 = twice*v3
+        call tangent_of_momentum(1.0_wp, x, v, r11, r12, r13, r22, r23, r33, x1, x2, x3, v1, v2, v3, f%e1, &
+                                 f%e2, f%e3, j11, j12, j13, j21, j22, j23, j31, j32, j33)
+        if (.not. present(q)) then
+            call put(f%o1, f%o2, f%o3, 3, 0, j11, j12, j13, j21, j22, j23, j31, j32, j33, jacobian)
+            return
+        end if
+        call put(f%o1, f%o2, f%o3, 6, 0, j11, j12, j13, j21, j22, j23, j31, j32, j33, transition)
+        psi = -2*(f%b*f%g)*((f%dd + (1 - f%r*f%y)*f%bb)*over_w)
+        k = 2*((f%rate - f%along*f%cosine) - (f%b*f%nu)*((1 - f%p*f%y)*f%aa*over_w))*over_gg
+        call tangent_of_attitude(f%side, 1.0_wp, x, v, r11, r12, r13, r22, r23, r33, x1, x2, x3, v1, v2, v3, &
+                                 f%e1, f%e2, f%e3, f%m1, f%m2, f%m3, 2*f%along*f%cosine, 2*f%along*f%along, &
+                                 k*f%m1, (k + psi*f%g)*f%m2, (k + psi*f%b)*f%m3, &
+                                 j11, j12, j13, j21, j22, j23, j31, j32, j33)
+        call put(f%o1, f%o2, f%o3, 6, 3, j11, j12, j13, j21, j22, j23, j31, j32, j33, transition)
+        transition(1:3, 4:6) = 0.0_wp
+        if (present(parts)) call describe(f, parts)
+    end subroutine short_tangent
+
+    !> The constants of the motion, in the form with the smaller nu unless the series do not reach so far.
+    pure subroutine set_form(body, t, m, f, reach)
+        type(body_core), intent(in) :: body
+        real(wp), intent(in) :: t, m(3)
+        type(step_parts), intent(out) :: f
+        integer, intent(out) :: reach
+        real(wp) :: square, mirror, pmax
+
+        call set_constants(body, t, m, f, mirror)
+        square = f%rate*f%rate*f%gg
+        pmax = max(f%p, f%r)
+        reach = middle_step
+        if (square > middle_turn_limit .or. pmax > middle_limit) then
+            reach = long_step
+            return
+        else if (square <= tiny_turn_limit .and. pmax <= tiny_limit) then
+            reach = tiny_step
+        else if (square <= small_turn_limit .and. pmax <= short_limit) then
+            reach = short_step
+        end if
+        call choose_form(body, t, mirror, f)
+    end subroutine set_form
+
+    !> The triple and the four integrals.
+    pure subroutine set_series(f, reach)
+        type(step_parts), intent(inout) :: f
+        integer, intent(in) :: reach
+        real(wp) :: e1, e2, s3
+
+        e1 = f%p + f%r
+        e2 = f%p*f%r
+        select case (reach)
+        case (tiny_step)
+            call tiny_series(e1, e2, f%y, f%scd)
+            f%third = tiny_third_kind(e1, e2, f%nu)
+            call tiny_integrals(e1, e2, f%p, f%r, f%dd, f%aa, f%bb)
+        case (short_step)
+            call short_series(e1, e2, f%y, f%scd)
+            f%third = short_third_kind(e1, e2, f%nu)
+            call short_integrals(e1, e2, f%p, f%r, f%dd, f%aa, f%bb)
+        case default
+            call middle_series(e1, e2, f%y, f%scd)
+            call middle_integrals(f%p*f%y, f%r*f%y, f%dd, f%aa, f%bb)
+            s3 = f%y*sqrt(f%y)
+            f%third = s3*middle_third_kind(f%p*f%y, f%r*f%y, f%nu*f%y)
+            f%dd = s3*f%dd
+            f%aa = s3*f%aa
+            f%bb = s3*f%bb
+        end select
+    end subroutine set_series
+
+    !> D, A, B by the first terms of their series, for max(p, r) <= tiny_limit.
+    pure subroutine tiny_integrals(e1, e2, p, r, dd, aa, bb)
+        real(wp), intent(in) :: e1, e2, p, r            !! e1 = p + r, e2 = p r
+        real(wp), intent(out) :: dd, aa, bb
+        real(wp) :: a1
+
+        a1 = 1/5.0_wp - e1*(2/21.0_wp)
+        dd = (1/3.0_wp - e1*(1/15.0_wp)) + ((e1*e1)*(2/315.0_wp) + e2*(1/35.0_wp))
+        aa = dd + p*(a1 + p*(1/7.0_wp))
+        bb = dd + r*(a1 + r*(1/7.0_wp))
+    end subroutine tiny_integrals
+
+    !> m at the end of the step.
+    pure subroutine advance_momentum(f, m)
+        type(step_parts), intent(inout) :: f
+        real(wp), intent(inout) :: m(3)
+        real(wp) :: d1, d2, d3
+
+        call short_momentum(f%p*f%y, f%r*f%y, f%a*f%g*(f%m2*f%m2)*(f%scd*f%scd), f%scd, f%m1, f%m2, f%m3, &
+                            f%a*(f%m2*f%m3), f%b*(f%m3*f%m1), f%g*(f%m1*f%m2), d1, d2, d3)
+        f%e1 = f%m1 + d1
+        f%e2 = f%m2 + d2
+        f%e3 = f%m3 + d3
+        m(f%o1) = f%s1*f%e1
+        m(f%o2) = f%e2
+        m(f%o3) = f%s3*f%e3
+    end subroutine advance_momentum
+
+    !> q at the end of the step, E in `transition`, and 2/(1 + x^2 + v^2).
+    pure subroutine advance_attitude(f, reach, q, twice, transition)
+        type(step_parts), intent(inout) :: f
+        integer, intent(in) :: reach
+        real(wp), intent(inout) :: q(4)
+        real(wp), intent(out) :: twice
+        real(wp), intent(inout) :: transition(6, 6)
+        real(wp) :: angle, cosm1, v0, v2, v3, square, change, w0, w1, w2, w3, q1, q2, q3, k, z0
+        real(wp) :: e11, e12, e13, e21, e22, e23, e31, e32, e33
+
+        angle = f%rate - f%b*f%nu*f%third
+        square = angle*angle*f%gg
+        select case (reach)
+        case (tiny_step)
+            call tiny_turn(square, f%along, cosm1)
+        case (short_step)
+            call small_turn(square, f%along, cosm1)
+        case default
+            call middle_turn(square, f%along, cosm1)
+        end select
+        f%along = angle*f%along
+        f%cosine = 1 + cosm1
+        k = f%a*f%g*(f%m2*f%m2)
+        call short_direction(f%b, f%g, f%r*f%y, k*f%y, f%y, f%scd, f%m2, f%m3, f%b*(f%m3*f%m1), &
+                             f%g*(f%m1*f%m2), v0, v2, v3)
+        call join_turns(f%cosine, f%along, f%m1, f%m2, f%m3, 1 + v0, v2, v3, w1, w2, w3)
+        square = (v0*(2 + v0) + v2*v2) + v3*v3
+        select case (reach)
+        case (tiny_step)
+            change = tiny_norm(square)
+        case (short_step)
+            change = short_norm(square)
+        case default
+            change = middle_norm(square)
+        end select
+        z0 = (1 + v0)*(1 + change)
+        twice = 2*(z0*z0)
+        call small_unit_turn(cosm1, v0, f%along*(f%m2*v2 + f%m3*v3), change, w0, w1, w2, w3)
+        q1 = (f%side*f%s1)*q(1 + f%o1)
+        q2 = f%side*q(1 + f%o2)
+        q3 = (f%side*f%s3)*q(1 + f%o3)
+        call turn(w0, w1, w2, w3, q(1), q1, q2, q3)
+        q(1 + f%o1) = (f%side*f%s1)*q1
+        q(1 + f%o2) = f%side*q2
+        q(1 + f%o3) = (f%side*f%s3)*q3
+        call small_turn_matrix(w0, w1, w2, w3, e11, e12, e13, e21, e22, e23, e31, e32, e33)
+        call put(f%o1, f%o2, f%o3, 6, 21, e11, e12, e13, e21, e22, e23, e31, e32, e33, transition)
+    end subroutine advance_attitude
+
+    !> What the derivatives by the inertia want besides.
+    pure subroutine describe(f, parts)
+        type(step_parts), intent(in) :: f
+        type(step_parts), intent(out) :: parts
+        real(wp) :: cc, ee, over
+
+        parts = f
+        cc = 1 - f%p*f%y
+        ee = 1 - f%r*f%y
+        parts%s = sqrt(f%y)
+        parts%c = sqrt(cc)
+        parts%d = sqrt(ee)
+        parts%own = merge(f%bb, f%aa, f%c_is_cn)
+        parts%delta = abs(f%b*((f%a*(f%m3*f%m3)) - (f%g*(f%m1*f%m1))))
+        over = 1/(1 - f%a*f%g*(f%m2*f%m2)*f%y)
+        parts%n2 = (f%m2*(parts%c*parts%d) + f%b*f%m3*f%m1*parts%s)*over
+        parts%n3 = (f%m3*parts%c - f%g*f%m1*f%m2*(parts%s*parts%d))*over
+    end subroutine describe
+
+    include 'tangent_forms.inc'
+
+    include 'orbit_formulas.inc'
+
+    include 'short_formulas.inc'
+
+    include 'middle_formulas.inc'
+
+    include 'turn_formulas.inc'
+
+    include 'reach_formulas.inc'
+
+    include 'tangent_formulas.inc'
+
+    include 'tangent_short_formulas.inc'
+
+    include 'tangent_middle_formulas.inc'
+
+    include 'tangent_storage.inc'
+
+end module frb_flow_tangent_one

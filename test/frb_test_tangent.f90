@@ -1,0 +1,117 @@
+!> flow_tangent against reference cases, in units of the inherent sensitivity of each derivative: one body
+!> with and without its attitude, by its moments, bodies by a tensor.
+module frb_test_tangent
+    use frb_checks, only: tally
+    use frb_flow_samples, only: no_turn, settled
+    use frb_free_flow, only: flow_tangent, rigid_body
+    use frb_kinds, only: wp
+    use frb_reference_cases, only: reference_case, read_cases, score_momentum, score_attitude, median
+    use frb_tangent_cases, only: tangent_case, read_tangent_cases, read_tensor_cases, score_matrix
+    implicit none
+    private
+
+    public :: test_tangent
+
+    !> The bars, in units of the inherent sensitivity; medians of rods, whose angles about m are thousands of
+    !> those across it.
+    real(wp), parameter :: largest_median = 0.5_wp, median_of_rods = 0.6_wp, largest_score = 4.0_wp
+    !> J, W, dm' and dtheta' by the inertia, J of the momentum alone.
+    integer, parameter :: kinds = 5
+    character(*), parameter :: names(kinds) = [character(12) :: 'J', 'W', 'm-by-I', 'theta-by-I', 'J-alone']
+
+contains
+
+    subroutine test_tangent(t)
+        type(tally), intent(inout) :: t
+        type(tangent_case), allocatable :: cases(:)
+
+        call t%open_suite('tangent', 402)
+        call read_tangent_cases('data/reference/tangent_cases.txt', cases)
+        call check_groups(t, cases, '', 3, 13, .true.)
+        call read_tangent_cases('data/reference/tangent_cases_seed500.txt', cases)
+        call check_groups(t, cases, ' (seed 500)', 3, 13, .true.)
+        call read_tangent_cases('data/reference/tangent_limits.txt', cases)
+        call check_groups(t, cases, ' (limits)', 3, 11, .false.)
+        call read_tensor_cases('data/reference/tangent_tensors.txt', cases)
+        call check_groups(t, cases, ' (tensors)', 6, 8, .true.)
+        call check_state(t)
+        call t%close_suite()
+    end subroutine test_tangent
+
+    !> Medians and largest scores of all groups of a file; that there are so many.
+    subroutine check_groups(t, cases, label, columns, expected, medians)
+        type(tally), intent(inout) :: t
+        type(tangent_case), intent(in) :: cases(:)
+        character(*), intent(in) :: label
+        integer, intent(in) :: columns, expected
+        logical, intent(in) :: medians      !! scans of ten distances have none worth a bar
+        real(wp) :: score(size(cases), kinds), bar
+        logical :: here(size(cases))
+        integer :: i, k, groups
+
+        do i = 1, size(cases)
+            call score_case(cases(i), columns, score(i, :))
+        end do
+        groups = 0
+        do i = 1, size(cases)
+            if (any(cases(:i - 1)%group == cases(i)%group)) cycle
+            groups = groups + 1
+            here = cases%group == cases(i)%group
+            bar = merge(median_of_rods, largest_median, any(cases(i)%group == [character(9) :: 'elongated', &
+                                                                               'rod']))
+            do k = 1, kinds
+                associate (name => trim(names(k))//': '//trim(cases(i)%group)//label)
+                    if (medians) call t%at_most('median-of-'//name, median(pack(score(:, k), here)), bar)
+                    call t%at_most('score-of-'//name, maxval(score(:, k), mask=here), largest_score)
+                end associate
+            end do
+        end do
+        call t%equal('all-groups-are-there'//label, groups, expected)
+    end subroutine check_groups
+
+    !> The state against the reference cases of free_flow, with its bars.
+    subroutine check_state(t)
+        type(tally), intent(inout) :: t
+        type(reference_case), allocatable :: cases(:)
+        real(wp) :: m(3), q(4), m_alone(3), phi(6, 6), jacobian(3, 3), worst(3)
+        integer :: i
+
+        call read_cases('data/reference/cases.txt', cases)
+        worst = 0.0_wp
+        do i = 1, size(cases)
+            m = cases(i)%m0
+            q = no_turn
+            m_alone = m
+            call flow_tangent(rigid_body(cases(i)%moments), cases(i)%h, m, q, phi)
+            call flow_tangent(rigid_body(cases(i)%moments), cases(i)%h, m_alone, jacobian)
+            worst = max(worst, [score_momentum(cases(i), settled(m)), score_attitude(cases(i), settled(q)), &
+                                score_momentum(cases(i), settled(m_alone))])
+        end do
+        call t%at_most('momentum-as-free-flow', worst(1), 2.0_wp)
+        call t%at_most('attitude-as-free-flow', worst(2), 2.0_wp)
+        call t%at_most('momentum-alone-as-free-flow', worst(3), 2.0_wp)
+    end subroutine check_state
+
+    !> One case.
+    subroutine score_case(it, columns, score)
+        type(tangent_case), intent(in) :: it
+        integer, intent(in) :: columns          !! 3: by the moments; 6: by the tensor
+        real(wp), intent(out) :: score(:)
+        real(wp) :: m(3), q(4), transition(6, 6), jacobian(3, 3), by_inertia(6, columns)
+
+        m = it%m0
+        q = no_turn
+        call flow_tangent(it%body, it%h, m, q, transition, by_inertia)
+        score(1) = score_matrix(transition(1:3, 1:3), it%jacobian, it%sensitivity(1))
+        score(2) = score_matrix(transition(4:6, 1:3), it%turns, it%sensitivity(2))
+        score(3) = score_matrix(by_inertia(1:3, :), it%by_inertia(1:3, :columns), it%sensitivity(3))
+        score(4) = score_matrix(by_inertia(4:6, :), it%by_inertia(4:6, :columns), it%sensitivity(4))
+        m = it%m0
+        call flow_tangent(it%body, it%h, m, jacobian)
+        score(5) = score_matrix(jacobian, it%jacobian, it%sensitivity(1))
+        if (abs(it%h) > 0.0_wp) return
+        ! No step: the exact derivatives by m and I are 0, those of the file rounding of its many digits.
+        if (all(abs(transition(4:6, 1:3)) <= 0.0_wp) .and. all(abs(by_inertia) <= 0.0_wp)) score(2:4) = 0.0_wp
+    end subroutine score_case
+
+end module frb_test_tangent
