@@ -3,6 +3,7 @@ module frb_test_agm
     use frb_agm, only: ellip_k, ellip_f, jacobi_am, jacobi, landen_step
     use frb_carlson, only: rf, rd
     use frb_checks, only: tally, largest, worst_of
+    use frb_claims, only: k_error, f_error, am_error
     use frb_elliptic_table, only: table_entry, read_table, columns_of
     use frb_kinds, only: wp, pi, half_pi
     use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_is_finite, ieee_value, ieee_quiet_nan, &
@@ -13,8 +14,8 @@ module frb_test_agm
     public :: test_agm
 
     real(wp), parameter :: eps = epsilon(1.0_wp)
-    real(wp), parameter :: k_bound = 4*eps, f_bound = 6*eps, jacobi_bound = 4*eps
-    real(wp), parameter :: step_bound = 4*eps   ! relative to 1 + |u| + |du|
+    real(wp), parameter :: k_bound = k_error*eps, f_bound = f_error*eps, jacobi_bound = am_error*eps
+    real(wp), parameter :: step_bound = am_error*eps   ! relative to 1 + |u| + |du|
 
 contains
 

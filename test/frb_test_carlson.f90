@@ -2,6 +2,7 @@
 module frb_test_carlson
     use frb_carlson, only: rf, rc, rj, rd, rf_and_rj
     use frb_checks, only: tally, largest, worst_of
+    use frb_claims, only: rf_error, rc_error, rj_error
     use frb_elliptic_table, only: table_entry, read_table, columns_of
     use frb_kinds, only: wp, pi
     use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_is_finite, ieee_value, ieee_quiet_nan, &
@@ -12,7 +13,7 @@ module frb_test_carlson
     public :: test_carlson
 
     real(wp), parameter :: eps = epsilon(1.0_wp)
-    real(wp), parameter :: rf_bound = 4*eps, rc_bound = 4*eps, rj_bound = 6*eps
+    real(wp), parameter :: rf_bound = rf_error*eps, rc_bound = rc_error*eps, rj_bound = rj_error*eps
     real(wp), parameter :: principal_value_bound = 60*eps   ! near a zero of the principal value
 
 contains

@@ -2,6 +2,7 @@
 !> steps of the paper and with Taylor series, relative accuracy of small increments.
 module frb_test_flow_laws
     use frb_checks, only: tally, largest, worst_of
+    use frb_claims, only: flow_largest
     use frb_flow_limits, only: tiny_limit, short_limit, middle_limit, square_limit, period_limit, &
         tiny_turn_limit, small_turn_limit, middle_turn_limit
     use frb_flow_samples, only: stream, true_case, advanced, settled, near_separatrix, defect, no_turn
@@ -28,7 +29,6 @@ module frb_test_flow_laws
     real(wp), parameter :: on_the_orbit = 32*eps
     !> Increments from the identity, relative to their own size.
     real(wp), parameter :: increments = 8*eps
-    real(wp), parameter :: largest_score = 2.0_wp
 
     !> A motion and a step, for the checks over many of them.
     type :: sample
@@ -371,7 +371,7 @@ contains
                 score_q(i) = score_attitude(it, state(4:7))
             end do
             call t%at_most('taylor-agrees: '//trim(names(kind)), &
-                           largest([score_m(:count), score_q(:count)]), largest_score)
+                           largest([score_m(:count), score_q(:count)]), flow_largest)
         end do
     end subroutine check_taylor
 
@@ -422,7 +422,7 @@ contains
         end do
         call t%at_most('small-turns-keep-their-relative-accuracy', small(1), increments)
         call t%at_most('small-changes-of-m-keep-their-relative-accuracy', small(2), increments)
-        call t%at_most('no-jump-across-the-limits-of-the-formulas', score, largest_score)
+        call t%at_most('no-jump-across-the-limits-of-the-formulas', score, flow_largest)
     end subroutine check_increments
 
     !> The states after h of one body and of one in a batch.

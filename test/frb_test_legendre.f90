@@ -3,6 +3,7 @@ module frb_test_legendre
     use frb_agm, only: ellip_f, ellip_k, landen_step
     use frb_carlson, only: rf, rd
     use frb_checks, only: tally, largest
+    use frb_claims, only: pi_error
     use frb_elliptic_table, only: table_entry, read_table, columns_of
     use frb_kinds, only: wp, pi, half_pi
     use frb_legendre, only: ellpi, ellint_pi, ellint_pi_between
@@ -14,7 +15,7 @@ module frb_test_legendre
     public :: test_legendre
 
     real(wp), parameter :: eps = epsilon(1.0_wp)
-    real(wp), parameter :: pi_bound = 8*eps
+    real(wp), parameter :: pi_bound = pi_error*eps
 
 contains
 

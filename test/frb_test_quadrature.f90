@@ -1,6 +1,7 @@
 !> Gauss-Legendre rules, and the integral of the third kind by them.
 module frb_test_quadrature
     use frb_checks, only: tally, worst_of
+    use frb_claims, only: nodes_error, weight_error, far_weight_error
     use frb_elliptic_table, only: table_entry, read_table, columns_of
     use frb_kinds, only: wp, pi, most_points
     use frb_legendre, only: ellint_pi
@@ -16,9 +17,9 @@ module frb_test_quadrature
     public :: test_quadrature
 
     real(wp), parameter :: eps = epsilon(1.0_wp)
-    real(wp), parameter :: node_bound = eps              ! absolute
-    real(wp), parameter :: table_weight_bound = eps      ! relative, up to 10 points
-    real(wp), parameter :: weight_bound = 8*eps          ! relative, beyond
+    real(wp), parameter :: node_bound = nodes_error*eps              ! absolute
+    real(wp), parameter :: table_weight_bound = weight_error*eps       ! relative, up to 10 points
+    real(wp), parameter :: weight_bound = far_weight_error*eps         ! relative, beyond
 
 contains
 

@@ -1,6 +1,7 @@
 !> frb_step and quat_step: accuracy against references, special motions, extremes, refused input.
 module frb_test_steps
     use frb_checks, only: tally, largest, worst_of
+    use frb_claims, only: matrix_median, matrix_largest, frame_median, frame_largest, orthogonal
     use frb_kinds, only: wp
     use frb_matrix_step, only: frb_step
     use frb_quat_step, only: quat_step
@@ -17,8 +18,8 @@ module frb_test_steps
     real(wp), parameter :: eps = epsilon(1.0_wp)
 
     !> Median and maximum of the scores in every group, of momentum, matrix, quaternion in each frame.
-    real(wp), parameter :: units_matrix(2) = [1.0_wp, 3.0_wp], units_frame(2) = [1.5_wp, 3.0_wp]
-    real(wp), parameter :: orthogonal_to = 1.0e-14_wp
+    real(wp), parameter :: units_matrix(2) = [matrix_median, matrix_largest]
+    real(wp), parameter :: units_frame(2) = [frame_median, frame_largest]
 
     real(wp), parameter :: no_turn(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
     real(wp), parameter :: identity(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, &
@@ -64,7 +65,7 @@ contains
             end do
         end do
         call t%equal('all-reference-cases-are-read', size(cases), 325)
-        call t%at_most('attitude-is-orthogonal-or-unit', defect, orthogonal_to)
+        call t%at_most('attitude-is-orthogonal-or-unit', defect, orthogonal)
         do i = 1, size(cases)
             group = trim(cases(i)%group)
             if (i > 1) then
@@ -218,7 +219,7 @@ contains
             end do
         end do
         call t%ok('every-finite-input-gives-a-finite-result', finite)
-        call t%at_most('extreme-steps-keep-the-attitude-orthogonal', defect, orthogonal_to)
+        call t%at_most('extreme-steps-keep-the-attitude-orthogonal', defect, orthogonal)
         call t%at_most('extreme-steps-keep-the-norm-of-the-momentum', change, 16*eps)
     end subroutine check_extremes
 

@@ -26,3 +26,19 @@ lint() {
     fi
     "$linter" check src app test examples
 }
+
+# The version of fpm.toml is that of the library, of C headers that tell one, of a citation file, and the first in the
+# change log of the README. What the drivers answer to --version is a gate of its own.
+versions_agree() {
+    local version file
+    version=$(sed -n 's/^version = "\(.*\)"$/\1/p' fpm.toml)
+    [ -n "$version" ]
+    grep -q "version = '$version'\$" src/base/frb_version.f90
+    for file in $(grep -rl --include='*.h' 'define FRB_VERSION ' src include 2>/dev/null); do
+        grep -q "define FRB_VERSION \"$version\"" "$file" || { echo "$file: not $version"; return 1; }
+    done
+    [ ! -e CITATION.cff ] || grep -q "^version: \"\?$version\"\?\$" CITATION.cff
+    if grep -qi '^#.*change log' README.md; then
+        [ "$(sed -n '/^#.*[Cc]hange log/,$p' README.md | grep -oE '[0-9]+\.[0-9]+\.[0-9]+' | head -n 1)" = "$version" ]
+    fi
+}

@@ -24,4 +24,16 @@ builds_strictly() { "$fpm" build --no-prune --flag "$strict"; }
 failing_check_fails_the_tests() {
     if "$fpm" test -- --fail >log 2>&1; then return 1; fi
     grep -Eq '^[0-9]+ passed, 1 failed$' log
+    # A stop leaves no closing line, and another name than those known runs nothing.
+    if "$fpm" test -- --stop >log 2>&1; then return 1; fi
+    if grep -Eq '^[0-9]+ passed' log; then return 1; fi
+    if "$fpm" test -- base no-such-suite >log 2>&1; then return 1; fi
+    grep -q 'no such suite: no-such-suite' log
+    if grep -Eq '^suite ' log; then return 1; fi
+}
+
+# Lines of src/ that the tests run, in percent of all.
+tests_run_every_line() {
+    "$fpm" test --flag "-O0 --coverage"
+    python3 .ci/gates/coverage.py 97
 }

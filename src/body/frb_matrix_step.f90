@@ -33,7 +33,7 @@ contains
     !>
     !> Accuracy of the exact step, in units of the inherent sensitivity (data/reference): median below 1 and
     !> maximum below 3 in every group, for m and Q; Q orthogonal to 1e-14 (checked by steps). In a chain of
-    !> 20 000 steps |m|, the energy and Q m stay to 3e-13, Q^T Q to 1e-13 (checked by step-laws); rounding
+    !> 20 000 steps |m|, the energy and Q^T Q stay to 1e-13, Q m to 3e-13 (checked by step-laws); rounding
     !> adds up like a random walk.
     !> The sensitivity itself grows near the middle axis and the separatrix: once h covers a half turn, m and
     !> Q lose about log10(1/(1 - k**2)) of 16 digits, all of them for 1 - k**2 below 1e-16, where m stays

@@ -40,7 +40,7 @@ module frb_paper_momentum
 contains
 
     !> m(h/2) and m(h) by the addition formulae; phi0 and phi1 are not set.
-    !> Accuracy: median below 1 and maximum below 4 units of the inherent sensitivity in every group of the
+    !> Accuracy: median below 1 and maximum below 3 units of the inherent sensitivity in every group of the
     !> reference cases; checked by steps.
     pure subroutine momentum_by_addition(motion, step)
         type(paper_motion), intent(in) :: motion    !! an elliptic motion

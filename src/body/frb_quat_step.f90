@@ -34,9 +34,9 @@ contains
     !> turn from qin to qout then has a scalar part >= 0.
     !>
     !> Accuracy of the exact step, in units of the inherent sensitivity (data/reference): in every group a
-    !> median below 1.5 and a maximum below 3, for m and for q in each frame; the turn from qin to qout is
-    !> unit to 1e-14 (checked by steps). In a chain of 20 000 steps |m|, the energy and q m q* stay to 3e-13,
-    !> |q| to 1e-13 (checked by step-laws); rounding adds up like a random walk.
+    !> median below 1.5 and a maximum below 3, for q in each frame, and below 1 and 3 for m; the turn from qin
+    !> to qout is unit to 1e-14 (checked by steps). In a chain of 20 000 steps |m|, the energy and |q| stay to
+    !> 1e-13, q m q* to 3e-13 (checked by step-laws); rounding adds up like a random walk.
     !> The sensitivity itself grows near the middle axis and the separatrix: once h covers a half turn, m and
     !> q lose about log10(1/(1 - k**2)) of 16 digits. The frames have poles, where p turns fast: m along -e3
     !> for (1), along any principal axis for (2), along +-e3 for (3). Exact steps lose nothing there;

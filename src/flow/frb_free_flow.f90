@@ -18,6 +18,7 @@
 !>
 !> Accuracy: m and attitude within 2 units (medians within 0.5) of the inherent sensitivity, on the 325 cases
 !> of data/reference and as many of another seed; largest seen 1.6. Held by the suite `free-flow`.
+!> A million steps, and ten million, keep |m|, |q| and the energy to 1e-12. Held by the suite `flow-runs`.
 !> Phases have no digits left when the angle turned in one step passes 2^53; the state is then on the right
 !> orbit, at an arbitrary phase.
 module frb_free_flow
