@@ -25,14 +25,14 @@ module frb_modified_kicks
 
 contains
 
-    !> I^-1 v in body axes.
+    !> I^-1 v in body axes; 0 about the axis of a linear rotor.
     pure function angular_response(core, v) result(w)
         type(body_core), intent(in) :: core
         real(wp), intent(in) :: v(3)
         real(wp) :: w(3)
 
         if (core%linear) then
-            w = core%a(1)*v
+            w = core%a(1)*(v - core%axis*dot_product(core%axis, v))
         else if (core%needs_rotation) then
             w = matmul(v, core%axes)
             w(core%order) = core%a*w(core%order)
