@@ -25,7 +25,7 @@ extern "C" {
 
 /* Sizes of the opaque types in doubles; the library does not compile with others. */
 #define FRB_BODY_DOUBLES 30
-#define FRB_MOTION_DOUBLES 45
+#define FRB_MOTION_DOUBLES 60
 
 typedef struct { double opaque[FRB_BODY_DOUBLES]; } frb_body;
 typedef struct { double opaque[FRB_MOTION_DOUBLES]; } frb_motion;

@@ -17,8 +17,8 @@ module frb_c
 
     public :: usable, triple, quadruple
 
-    !> Sizes of the opaque types of frb.h, in doubles.
-    integer, parameter :: body_doubles = 30, motion_doubles = 45
+    !> Sizes of the opaque types of frb.h, in doubles; a motion has room to spare.
+    integer, parameter :: body_doubles = 30, motion_doubles = 60
     !> Bodies gathered at a time where memory has other strides than the library.
     integer, parameter :: chunk = 64
 
@@ -103,6 +103,7 @@ contains
         type(body_core), pointer :: core
         type(triple), pointer :: m3
         type(quadruple), pointer :: q4
+        integer :: code
 
         stat = status_bad_moments
         if (.not. c_associated(body)) return
@@ -113,10 +114,11 @@ contains
         call c_f_pointer(m, m3)
         if (c_associated(q)) then
             call c_f_pointer(q, q4)
-            call flow_body(core, h, m3%x, stat, q4%x)
+            call flow_body(core, h, m3%x, code, q4%x)
         else
-            call flow_body(core, h, m3%x, stat)
+            call flow_body(core, h, m3%x, code)
         end if
+        stat = int(code, c_int)
     end function c_flow
 
     !> The flow of n bodies.
@@ -127,7 +129,7 @@ contains
         integer(c_int) :: stat
         type(body_core), pointer :: core(:)
         real(c_double), pointer, contiguous :: words(:, :), m_of(:, :), q_of(:, :)
-        integer :: bodies
+        integer :: bodies, code
         logical :: packed
 
         stat = status_bad_moments
@@ -151,11 +153,12 @@ contains
             packed = all_usable(core)
         end if
         if (packed) then
-            call flow_many(core, bodies, h, int(n), m_of, stat, q_of)
+            call flow_many(core, bodies, h, int(n), m_of, code, q_of)
         else
             call c_f_pointer(body, words, [max(ldb, int(body_doubles, c_size_t)), int(bodies, c_size_t)])
-            call flow_strided(words, h, m_of, stat, q_of)
+            call flow_strided(words, h, m_of, code, q_of)
         end if
+        stat = int(code, c_int)
     end function c_flow_many
 
     !> The same where bodies or states stand further apart, or bodies were not made: chunk after chunk is
@@ -224,7 +227,7 @@ contains
         call c_f_pointer(q, q4)
         sealed%motion = free_motion(whole_body, m3%x, q4%x)
         sealed%seal = seal_of_motions
-        stat = sealed%motion%status
+        stat = int(sealed%motion%status, c_int)
     end function c_motion_start
 
     !> The state at n times.
@@ -257,7 +260,7 @@ contains
             else
                 call sealed%motion%at(t_of(i), m_of(:3, i), stat=code)
             end if
-            stat = max(stat, code)
+            stat = max(stat, int(code, c_int))
         end do
     end function c_motion_at
 
@@ -308,11 +311,11 @@ contains
         bytes = one*8*body_doubles
     end function c_body_bytes
 
-    !> Bytes of a motion: those of frb.h, or this does not compile.
+    !> Bytes of a motion: no more than those of frb.h, or this does not compile.
     pure function c_motion_bytes() bind(c, name='frb_motion_bytes') result(bytes)
         integer(c_size_t) :: bytes
         type(sealed_motion) :: motion
-        integer, parameter :: one = 1/merge(1, 0, storage_size(motion) == 64*motion_doubles)
+        integer, parameter :: one = 1/merge(1, 0, storage_size(motion) <= 64*motion_doubles)
 
         bytes = one*8*motion_doubles
     end function c_motion_bytes
@@ -359,13 +362,13 @@ contains
     function status_of(motion, sealed) result(stat)
         type(c_ptr), intent(in) :: motion
         type(sealed_motion), pointer, intent(out) :: sealed
-        integer :: stat
+        integer(c_int) :: stat
 
         stat = status_bad_moments
         nullify (sealed)
         if (.not. c_associated(motion)) return
         call c_f_pointer(motion, sealed)
-        if (sealed%seal == seal_of_motions) stat = sealed%motion%status
+        if (sealed%seal == seal_of_motions) stat = int(sealed%motion%status, c_int)
     end function status_of
 
     !> Puts a text into the caller's memory, ended by a null, as much as fits; gives its whole length.

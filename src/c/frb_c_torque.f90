@@ -97,13 +97,14 @@ contains
         class(body_scene), intent(inout) :: scene
         real(c_double), intent(in) :: h
         integer(c_int64_t), intent(in) :: steps
-        integer, intent(out) :: stat
+        integer(c_int), intent(out) :: stat
         type(body_core), pointer :: core
         type(rigid_body), pointer :: whole_body
         type(triple), pointer :: m3
         type(quadruple), pointer :: q4
         real(c_double), pointer :: time, rest(:)
         real(c_double), target :: no_time
+        integer :: code
 
         stat = status_bad_moments
         if (.not. c_associated(body)) return
@@ -125,11 +126,12 @@ contains
             if (c_associated(rests)) then
                 call c_f_pointer(rests, rest, [7])
                 call integrate(whole_body, chosen, scene, h, steps, m3%x, q4%x, t=time, compensated=.true., &
-                               rests=rest, stat=stat)
+                               rests=rest, stat=code)
             else
-                call integrate(whole_body, chosen, scene, h, steps, m3%x, q4%x, t=time, stat=stat)
+                call integrate(whole_body, chosen, scene, h, steps, m3%x, q4%x, t=time, stat=code)
             end if
         end associate
+        stat = int(code, c_int)
     end subroutine run
 
     !> The text at an address of C, up to its ending null.
