@@ -48,7 +48,13 @@ end program scene2_hairer_vilmart
 !     s6        h = 1/6: 6.2E-06  h = 1/12: 3.9E-07  quotient 2 to the 4.0
 !     srkn11    h = 1/6: 5.1E-09  h = 1/12: 8.1E-11  quotient 2 to the 6.0
 !     srkn14    h = 1/6: 2.4E-10  h = 1/12: 3.7E-12  quotient 2 to the 6.0
+!     srkn17    h = 1/6: 2.9E-10  h = 1/12: 1.2E-12  quotient 2 to the 8.0
 !     aba864    h = 1/6: 4.7E-08  h = 1/12: 7.7E-10  quotient 2 to the 5.9
+!     aba1064   h = 1/6: 1.8E-08  h = 1/12: 4.1E-10  quotient 2 to the 5.4
+!     fg4       h = 1/6: 2.5E-07  h = 1/12: 1.5E-08  quotient 2 to the 4.1
+!     fg6a      h = 1/6: 1.5E-08  h = 1/12: 2.3E-10  quotient 2 to the 6.0
+!     fg6b      h = 1/6: 1.7E-07  h = 1/12: 2.7E-09  quotient 2 to the 6.0
+!     fg8       h = 1/6: 1.1E-10  h = 1/12: 3.9E-13  quotient 2 to the 8.1
 !   flat        m(10) =   1.91238  1.39272  0.93528
 !     strang    h = 1/6: 9.8E-02  h = 1/12: 2.5E-02  quotient 2 to the 2.0
 !     yoshida4  h = 1/6: 5.6E-03  h = 1/12: 3.4E-04  quotient 2 to the 4.0
@@ -56,4 +62,10 @@ end program scene2_hairer_vilmart
 !     s6        h = 1/6: 8.7E-05  h = 1/12: 5.4E-06  quotient 2 to the 4.0
 !     srkn11    h = 1/6: 9.0E-08  h = 1/12: 1.4E-09  quotient 2 to the 6.0
 !     srkn14    h = 1/6: 9.9E-09  h = 1/12: 1.4E-10  quotient 2 to the 6.1
+!     srkn17    h = 1/6: 9.0E-09  h = 1/12: 3.6E-11  quotient 2 to the 8.0
 !     aba864    h = 1/6: 5.8E-07  h = 1/12: 1.0E-08  quotient 2 to the 5.9
+!     aba1064   h = 1/6: 1.8E-07  h = 1/12: 4.4E-09  quotient 2 to the 5.3
+!     fg4       h = 1/6: 3.1E-06  h = 1/12: 2.6E-07  quotient 2 to the 3.6
+!     fg6a      h = 1/6: 2.0E-07  h = 1/12: 2.7E-09  quotient 2 to the 6.2
+!     fg6b      h = 1/6: 5.5E-06  h = 1/12: 8.4E-08  quotient 2 to the 6.0
+!     fg8       h = 1/6: 1.2E-08  h = 1/12: 4.4E-11  quotient 2 to the 8.1

@@ -1,22 +1,23 @@
 !> A drop of 64 rigid water molecules: a loop of one's own with centres, momenta, attitudes and angular
-!> momenta, in batches. With velocity Verlet the splitting between forces and motion makes the whole error,
-!> and the exact rotation gains nothing over the turns of NO_SQUISH; they hold a scheme of order 4 at order 2.
+!> momenta, in batches: `run_water` in water_model.inc. With velocity Verlet the splitting between forces and
+!> motion makes the whole error, and the exact rotation gains nothing over the turns of NO_SQUISH; they hold a
+!> scheme of order 4 at order 2.
 !>
 !> `scene7_water 20` runs for 20 ps instead of 1.
 module frb_water
-    use frb, only: wp, rigid_body, free_flow, quat_product, quat_conjugate, quat_to_matrix
+    use frb, only: wp, rigid_body, free_flow, splitting_plan, quat_product, quat_conjugate, quat_to_matrix
     implicit none
     private
 
-    public :: cluster, load, forces, energy, drift, fluctuation, water_moments
+    public :: cluster, load, energy, run_water
 
     include 'water_model.inc'
 
 end module frb_water
 
 program scene7_water
-    use frb, only: wp, rigid_body, splitting_plan, splitting_scheme
-    use frb_water, only: cluster, load, forces, energy, drift, fluctuation, water_moments
+    use frb, only: wp, splitting_plan, splitting_scheme
+    use frb_water, only: cluster, load, energy, run_water
     implicit none
     type(splitting_scheme) :: verlet
     type(cluster) :: start
@@ -39,42 +40,13 @@ contains
     subroutine compare(scheme, h)
         type(splitting_scheme), intent(in) :: scheme
         real(wp), intent(in) :: h
+        real(wp), parameter :: spacing = 12.0_wp        ! of looks at the energy [fs]
         real(wp) :: rms(2)
 
-        call run(splitting_plan(scheme, h), h, .false., rms(1))
-        call run(splitting_plan(scheme, h), h, .true., rms(2))
+        call run_water(splitting_plan(scheme, h), h, 1000*picoseconds, spacing, .false., start, rms(1))
+        call run_water(splitting_plan(scheme, h), h, 1000*picoseconds, spacing, .true., start, rms(2))
         print '(a9,f7.1,f11.2,2es12.2)', scheme%name, h, scheme%stages()/h, rms
     end subroutine compare
-
-    !> The energy is looked at every 12 fs, after a whole step.
-    subroutine run(plan, h, squish, rms)
-        type(splitting_plan), intent(in) :: plan
-        real(wp), intent(in) :: h
-        logical, intent(in) :: squish
-        real(wp), intent(out) :: rms
-        real(wp), parameter :: spacing = 12.0_wp
-        type(cluster) :: box
-        type(rigid_body) :: water
-        real(wp) :: series(0:nint(1000*picoseconds/spacing))
-        integer :: step, stage, every
-
-        water = rigid_body(water_moments())
-        every = nint(spacing/h)
-        box = start
-        series(0) = energy(box)
-        do step = 1, every*ubound(series, 1)
-            do stage = 1, plan%stages
-                if (abs(plan%drift(stage)) > 0.0_wp) then
-                    call drift(water, plan%drift(stage), squish, box)
-                    call forces(box)        ! else those of the step before still hold
-                end if
-                box%p = box%p + plan%kick(stage)*box%force
-                box%m = box%m + plan%kick(stage)*box%tau
-            end do
-            if (mod(step, every) == 0) series(step/every) = energy(box)
-        end do
-        rms = fluctuation(series)
-    end subroutine run
 
 end program scene7_water
 

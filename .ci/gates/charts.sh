@@ -5,12 +5,12 @@ charts_draw() {
     local table
     "$bin/frb_charts" all --quick --out "$work/charts"
     "$bin/frb_charts" agreement --quick --out "$work/charts" | grep -E "^ +[0-9]+ of [0-9]+ ratios agree within 15 %$"
-    [ "$(ls "$work/charts"/*.dat | wc -l)" -ge 24 ]
+    [ "$(ls "$work/charts"/*.dat | wc -l)" -ge 25 ]
     for table in "$work/charts"/*.dat; do
         grep -q '^# columns: ' "$table"
         grep -vq '^#' "$table"
     done
-    for table in work-precision failure cost growth heavy-top triangle scale orbits racket torus; do
+    for table in work-precision failure cost growth heavy-top triangle scale water orbits racket torus; do
         [ -s "$work/charts/$table.svg" ] || ! command -v gnuplot
     done
     # Pictures a browser can show: well-formed, those of the README and those just drawn.

@@ -12,6 +12,7 @@ program frb_charts
     use frb_chart_top, only: chart_heavy_top, chart_torus
     use frb_chart_torque, only: chart_torque
     use frb_chart_triangle, only: chart_triangle
+    use frb_chart_water, only: chart_water
     use frb_kinds, only: has_quad
     use frb_system, only: c_exit
     use, intrinsic :: iso_c_binding, only: c_int
@@ -19,7 +20,7 @@ program frb_charts
     implicit none
 
     character(*), parameter :: names(*) = [character(16) :: 'speed', 'scenes', 'cost', 'work-precision', &
-        'heavy-top', 'torque', 'failure', 'growth', 'triangle', 'scale', 'orbits', 'agreement']
+        'heavy-top', 'torque', 'failure', 'growth', 'triangle', 'scale', 'water', 'orbits', 'agreement']
     type(settings) :: options
     character(:), allocatable :: argument
     logical :: wanted(size(names))
@@ -83,6 +84,8 @@ program frb_charts
             call chart_triangle(options)
         case ('scale')
             call chart_scale(options)
+        case ('water')
+            call chart_water(options)
         case ('orbits')
             call chart_orbits(options)
             call chart_racket(options)
@@ -120,6 +123,7 @@ contains
         call say('  growth          error against the number of steps for the same time')
         call say('  triangle        error of one step h = 1 over all shapes of a body')
         call say('  scale           time per body against the number of bodies')
+        call say('  water           energy of rigid water molecules: schemes, exact rotation and NO_SQUISH')
         call say('  orbits          polhodes, the tennis racket, the torus of a heavy top')
         call say('  agreement       check: measures cost twice, tells how many ratios agree within 15 %')
         call say('--quick: a minute for all of them; --out DIR: where the tables, scripts and '// &
