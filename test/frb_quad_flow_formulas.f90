@@ -12,6 +12,8 @@ module frb_quad_flow_formulas
 
 contains
 
+    include '../src/flow/series_formulas.inc'
+
     include '../src/flow/short_formulas.inc'
 
     include '../src/flow/middle_formulas.inc'
@@ -19,5 +21,7 @@ contains
     include '../src/flow/long_formulas.inc'
 
     include '../src/flow/turn_formulas.inc'
+
+    include '../src/flow/join_formulas.inc'
 
 end module frb_quad_flow_formulas

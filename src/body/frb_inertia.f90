@@ -26,14 +26,17 @@ module frb_inertia
     !> What `type(rigid_body)` holds. A core that could not be made has `status /= status_ok`, and every
     !> routine that takes a body refuses it with that code. Interoperable, so that C can hold arrays of them.
     type, bind(c) :: body_core
-        integer(c_int) :: status = status_bad_moments !! `status_ok`, or why the body could not be made
-        real(c_double) :: moments(3) = 0.0_wp         !! principal moments, in the order of the axes
-        integer(c_int) :: order(3) = [1, 2, 3]        !! I(order(1)) <= I(order(2)) <= I(order(3))
-        real(c_double) :: parity = 1.0_wp             !! -1 when `order` is an odd permutation, else +1
+        ! What blocks of bodies read comes first, in one line of the cache.
+        real(c_double) :: lane = 0.0_wp               !! 1 to 3: first axis of the cyclic order; 4: the axes
+                                                      !! turn; < 0: moments descend; 0: not in a block
         real(c_double) :: a(3) = 0.0_wp               !! 1/I, sorted: a(1) >= a(2) >= a(3)
         real(c_double) :: alpha = 0.0_wp              !! a(2) - a(3) >= 0, from the differences
         real(c_double) :: beta = 0.0_wp               !! a(1) - a(3) >= 0
         real(c_double) :: gamma = 0.0_wp              !! a(1) - a(2) >= 0
+        integer(c_int) :: status = status_bad_moments !! `status_ok`, or why the body could not be made
+        integer(c_int) :: order(3) = [1, 2, 3]        !! I(order(1)) <= I(order(2)) <= I(order(3))
+        real(c_double) :: moments(3) = 0.0_wp         !! principal moments, in the order of the axes
+        real(c_double) :: parity = 1.0_wp             !! -1 when `order` is an odd permutation, else +1
         logical(c_bool) :: linear = .false.           !! a linear rotor
         logical(c_bool) :: needs_rotation = .false.   !! body axes are not principal, or the rotor is linear
         real(c_double) :: axes(3, 3) = identity       !! columns: principal axes in body axes
@@ -82,6 +85,7 @@ contains
         end if
         core%status = status_ok
         core%moments = moments
+        if (.not. core%linear) core%lane = core%parity*core%order(merge(1, 3, core%parity > 0))
     end function core_from_moments
 
     !> The core of a body with the given inertia tensor: see `rigid_body`. `status` is that of
@@ -103,6 +107,7 @@ contains
         if (core%linear) core%axis = matmul(axes, core%axis)
         ! Any element off the diagonal counts: the cosine of an angle below 1e-8 rounds to 1.
         core%needs_rotation = core%linear .or. any(abs(axes - identity) > 0.0_wp)
+        if (core%needs_rotation .and. .not. core%linear) core%lane = 4*core%parity
     end function core_from_tensor
 
     !> Takes what a linear rotor's momentum has along the axis out of m, where it is more than rounding.

@@ -153,7 +153,7 @@ contains
             packed = all_usable(core)
         end if
         if (packed) then
-            call flow_many(core, bodies, h, int(n), m_of, code, q_of)
+            call flow_many(core, bodies, [h], 1, int(n), m_of, code, q_of)
         else
             call c_f_pointer(body, words, [max(ldb, int(body_doubles, c_size_t)), int(bodies, c_size_t)])
             call flow_strided(words, h, m_of, code, q_of)
@@ -190,10 +190,10 @@ contains
             near_m(:, :count) = m(:3, first:last)
             if (present(q)) then
                 near_q(:, :count) = q(:4, first:last)
-                call flow_many(near, bodies, h, count, near_m, code_here, near_q)
+                call flow_many(near, bodies, [h], 1, count, near_m, code_here, near_q)
                 q(:4, first:last) = near_q(:, :count)
             else
-                call flow_many(near, bodies, h, count, near_m, code_here)
+                call flow_many(near, bodies, [h], 1, count, near_m, code_here)
             end if
             m(:3, first:last) = near_m(:, :count)
             code = max(code, code_here)

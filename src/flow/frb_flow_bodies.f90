@@ -1,13 +1,13 @@
 !> Many free bodies at once: blocks of them through SIMD lanes, blocks through threads.
 module frb_flow_bodies
-    use frb_flow_block, only: flow_block
-    use frb_flow_lanes, only: lanes, block_of_bodies
+    use frb_flow_blocks, only: block_of_bodies, set_bodies, step_lanes
+    use frb_flow_lanes, only: lanes, vector, workspace, is_served
     use frb_flow_limits, only: plain_largest, plain_smallest
     use frb_flow_one, only: flow_body
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
-    use frb_status, only: status_ok, status_bad_time
-    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+    use frb_status, only: status_ok, status_bad_attitude, status_bad_time
+    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_is_nan
     use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
@@ -16,264 +16,227 @@ module frb_flow_bodies
 
 contains
 
-    !> Many bodies in blocks, one per SIMD lane; body(:) holds one body for all or one for each. The blocks
-    !> are independent: with -fopenmp they are shared among the threads.
-    subroutine flow_many(body, bodies, h, n, m, code, q)
-        integer, intent(in) :: bodies, n            !! bodies: 1 or n
+    !> Many bodies in blocks, one per SIMD lane; body(:) holds one body for all or one for each, and so does
+    !> h(:). The blocks are independent: with -fopenmp they are shared among the threads.
+    subroutine flow_many(body, bodies, h, times, n, m, code, q)
+        integer, intent(in) :: bodies, times, n     !! bodies and times: 1 or n
         type(body_core), intent(in) :: body(bodies)
-        real(wp), intent(in) :: h
+        real(wp), intent(in) :: h(times)
         real(wp), intent(inout) :: m(3, n)
         integer, intent(out) :: code
         real(wp), intent(inout), optional :: q(4, n)
         type(block_of_bodies) :: block
-        integer :: first, last, one, count, refused
-        logical :: equal, served
+        integer :: first, count, refused
 
         code = status_ok
         if (bodies == 1) code = body(1)%status
-        if (code == status_ok .and. .not. ieee_is_finite(h)) code = status_bad_time
-        if (code /= status_ok) return
+        if (code == status_ok .and. times == 1 .and. .not. ieee_is_finite(h(1))) code = status_bad_time
+        if (code /= status_ok .or. n == 0) return
         refused = status_ok
-        equal = .false.
-        if (bodies == 1) equal = .not. body(1)%needs_rotation .and. is_plain_time(body(1), h)
-        if (equal) call set_body(body(1), block)
-        !$omp parallel do if (n >= 64*lanes) firstprivate(block) private(last, one, count, served) &
-        !$omp& reduction(max: refused)
+        call set_bodies(body, bodies, h, times, 1, min(n, lanes), block)
+        !$omp parallel do if (n >= 64*lanes) firstprivate(block) private(count) reduction(max: refused)
         do first = 1, n, lanes
-            last = min(first + lanes - 1, n)
-            count = last - first + 1
-            if (equal .and. count == lanes) then
-                ! The usual case: whole blocks of one body; what is not plain goes the other way.
-                if (present(q)) then
-                    call flow_whole(body, h, block, m(1, first), served, refused, q(1, first))
-                else
-                    call flow_whole(body, h, block, m(1, first), served, refused)
-                end if
-                if (served) cycle
+            count = min(lanes, n - first + 1)
+            if (max(bodies, times) > 1) call set_bodies(body, bodies, h, times, first, count, block)
+            if (present(q)) then
+                call flow_rows(body, bodies, h, times, first, count, block, m(1, first), refused, q(1, first))
+            else
+                call flow_rows(body, bodies, h, times, first, count, block, m(1, first), refused)
             end if
-            one = merge(1, count, bodies == 1)
-            associate (body_1 => body(merge(1, first, bodies == 1):merge(1, last, bodies == 1)))
-                if (present(q)) then
-                    call load_block(body_1, one, count, h, m(1, first), block, q(1, first))
-                    call flow_block(block, 0.5_wp*h, .true., served)
-                    call store_block(body_1, one, count, h, block, m(1, first), refused, q(1, first))
-                else
-                    call load_block(body_1, one, count, h, m(1, first), block)
-                    call flow_block(block, 0.5_wp*h, .false., served)
-                    call store_block(body_1, one, count, h, block, m(1, first), refused)
-                end if
-            end associate
-            if (equal) call set_body(body(1), block)
         end do
         !$omp end parallel do
         code = refused
     end subroutine flow_many
 
-    !> The same body into all lanes.
-    pure subroutine set_body(body, bodies)
-        type(body_core), intent(in) :: body
-        type(block_of_bodies), intent(out) :: bodies
-
-        bodies%alpha = body%alpha
-        bodies%beta = body%beta
-        bodies%gamma = body%gamma
-        bodies%a1 = body%a(1)
-        bodies%a3 = body%a(3)
-        bodies%m = 0.0_wp
-        bodies%q = 0.0_wp
-        bodies%served = 0
-    end subroutine set_body
-
-    !> Advances `lanes` equal bodies if all are plain; else, served = .false., they are left as they are.
-    subroutine flow_whole(body, h, bodies, m, served, refused, q)
-        type(body_core), intent(in) :: body(1)             !! in its principal axes, plain in the time h
-        real(wp), intent(in) :: h
-        type(block_of_bodies), intent(inout) :: bodies      !! with the body in all lanes
-        real(wp), intent(inout) :: m(3, lanes)
-        logical, intent(out) :: served
-        integer, intent(inout) :: refused
-        real(wp), intent(inout), optional :: q(4, lanes)
-        logical :: all_served
-        integer :: l, i1, i2, i3
-
-        ! Column of axis j in the block: the inverse of the sorting.
-        i1 = findloc_of(int(body(1)%order), 1)
-        i2 = findloc_of(int(body(1)%order), 2)
-        i3 = findloc_of(int(body(1)%order), 3)
-        do l = 1, lanes
-            bodies%m(l, i1) = m(1, l)
-            bodies%m(l, i2) = m(2, l)
-            bodies%m(l, i3) = m(3, l)
-        end do
-        served = all_plain(bodies%m(:, 1), bodies%m(:, 2), bodies%m(:, 3))
-        if (served .and. present(q)) then
-            do l = 1, lanes
-                bodies%q(l, 0) = q(1, l)
-                bodies%q(l, i1) = q(2, l)
-                bodies%q(l, i2) = q(3, l)
-                bodies%q(l, i3) = q(4, l)
-            end do
-            served = all_plain(bodies%q(:, 0), bodies%q(:, 1), bodies%q(:, 2), bodies%q(:, 3))
-        end if
-        if (.not. served) return
-        bodies%served = 1
-        if (body(1)%parity < 0.0_wp) call reflect(bodies)
-        call flow_block(bodies, 0.5_wp*h, present(q), all_served)
-        if (.not. all_served) then
-            call store_block(body, 1, lanes, h, bodies, m, refused, q)
-            return
-        end if
-        if (body(1)%parity < 0.0_wp) call reflect(bodies)
-        do l = 1, lanes
-            m(1, l) = bodies%m(l, i1)
-            m(2, l) = bodies%m(l, i2)
-            m(3, l) = bodies%m(l, i3)
-        end do
-        if (.not. present(q)) return
-        do l = 1, lanes
-            q(1, l) = bodies%q(l, 0)
-            q(2, l) = bodies%q(l, i1)
-            q(3, l) = bodies%q(l, i2)
-            q(4, l) = bodies%q(l, i3)
-        end do
-    end subroutine flow_whole
-
-    !> To and from sorted axes that are right-handed: an odd sorting turns the last axis round.
-    pure subroutine reflect(bodies)
-        type(block_of_bodies), intent(inout) :: bodies
-
-        bodies%m(:, 3) = -bodies%m(:, 3)
-        bodies%q(:, 3) = -bodies%q(:, 3)
-    end subroutine reflect
-
-    !> Whether the largest component of every vector (x1, x2, x3, x4) is a plain number.
-    pure function all_plain(x1, x2, x3, x4) result(plain)
-        real(wp), intent(in) :: x1(lanes), x2(lanes), x3(lanes)
-        real(wp), intent(in), optional :: x4(lanes)
-        logical :: plain
-        integer(int64) :: largest, smallest, most
-        integer :: l
-
-        largest = 0_int64
-        smallest = huge(0_int64)
-        do l = 1, lanes
-            most = max(magnitude(x1(l)), magnitude(x2(l)), magnitude(x3(l)))
-            if (present(x4)) most = max(most, magnitude(x4(l)))
-            largest = max(largest, most)
-            smallest = min(smallest, most)
-        end do
-        plain = are_plain(smallest, largest)
-    end function all_plain
-
-    !> Bodies first to last into the lanes of a block, in sorted axes; lanes that hold no plain state rest.
-    subroutine load_block(body, different, count, h, m, bodies, q)
-        integer, intent(in) :: different, count     !! bodies that differ: 1 or count
-        type(body_core), intent(in) :: body(different)
-        real(wp), intent(in) :: h
-        real(wp), intent(in) :: m(3, count)
-        type(block_of_bodies), intent(out) :: bodies
-        real(wp), intent(in), optional :: q(4, count)
-        integer :: l
-
-        bodies%m = 0.0_wp
-        bodies%q = 0.0_wp
-        bodies%alpha = 0.0_wp
-        bodies%beta = 0.0_wp
-        bodies%gamma = 0.0_wp
-        bodies%a1 = 0.0_wp
-        bodies%a3 = 0.0_wp
-        bodies%served = 0
-        do l = 1, count
-            associate (one => body(min(l, different)))
-                bodies%m(l, :) = m(one%order, l)
-                if (present(q)) bodies%q(l, :) = [q(1, l), q(1 + one%order, l)]
-                if (lane_is_plain(one, h, bodies, l, present(q))) then
-                    bodies%served(l) = 1
-                    bodies%alpha(l) = one%alpha
-                    bodies%beta(l) = one%beta
-                    bodies%gamma(l) = one%gamma
-                    bodies%a1(l) = one%a(1)
-                    bodies%a3(l) = one%a(3)
-                    bodies%m(l, 3) = one%parity*bodies%m(l, 3)
-                    bodies%q(l, 3) = one%parity*bodies%q(l, 3)
-                else
-                    bodies%m(l, :) = 0.0_wp
-                    bodies%q(l, :) = 0.0_wp
-                end if
-            end associate
-        end do
-    end subroutine load_block
-
-    !> Whether angles that the body turns in the time h stay far from overflow.
-    pure function is_plain_time(body, h) result(plain)
-        type(body_core), intent(in) :: body
-        real(wp), intent(in) :: h               !! finite
-        logical :: plain
-
-        plain = abs(h) < plain_largest .and. body%a(1) < plain_largest
-        if (plain) plain = abs(body%a(1)*h) < plain_largest
-    end function is_plain_time
-
-    !> Whether one lane holds plain numbers of a body in its principal axes.
-    pure function lane_is_plain(one, h, bodies, l, with_attitude) result(plain)
-        type(body_core), intent(in) :: one
-        real(wp), intent(in) :: h
-        type(block_of_bodies), intent(in) :: bodies
-        integer, intent(in) :: l
-        logical, intent(in) :: with_attitude
-        logical :: plain
-        integer(int64) :: most
-
-        plain = one%status == status_ok .and. .not. one%needs_rotation
-        if (.not. plain) return
-        most = maxval(magnitude(bodies%m(l, :)))
-        plain = are_plain(most, most) .and. is_plain_time(one, h)
-        if (plain .and. with_attitude) then
-            most = maxval(magnitude(bodies%q(l, :)))
-            plain = are_plain(most, most)
-        end if
-    end function lane_is_plain
-
-    !> Lanes back to bodies first to last; those the block did not serve go one by one.
-    subroutine store_block(body, different, count, h, bodies, m, refused, q)
-        integer, intent(in) :: different, count     !! bodies that differ: 1 or count
-        type(body_core), intent(in) :: body(different)
-        real(wp), intent(in) :: h
-        type(block_of_bodies), intent(in) :: bodies
+    !> One block: in place if all is plain and the lanes are whole vectors.
+    subroutine flow_rows(body, bodies, h, times, first, count, block, m, refused, q)
+        integer, intent(in) :: bodies, times, first, count
+        type(body_core), intent(in) :: body(bodies)
+        real(wp), intent(in) :: h(times)
+        type(block_of_bodies), intent(in) :: block
         real(wp), intent(inout) :: m(3, count)
         integer, intent(inout) :: refused
         real(wp), intent(inout), optional :: q(4, count)
-        integer :: l, code
+        type(workspace) :: work
+        real(wp) :: x(lanes, 3), copy_m(3, lanes), copy_q(4, lanes)
+        logical :: good(lanes), served
+        integer :: l, full, code
 
+        if (block%all_plain .and. mod(count, vector) == 0) then
+            call load_momenta(count, block, m, x, served)
+            if (served .and. present(q)) served = all_finite(4*count, q)
+            if (served) call step_lanes(count, present(q), block, x, work, served)
+            if (served) then
+                if (present(q)) call turn_attitudes(count, block, work, refused, q)
+                call store_momenta(count, block, work, x, m)
+                return
+            end if
+        end if
+        full = vector*((count + vector - 1)/vector)
         do l = 1, count
-            associate (one => body(min(l, different)))
-                if (bodies%served(l) == 1) then
-                    m(one%order, l) = [bodies%m(l, 1), bodies%m(l, 2), one%parity*bodies%m(l, 3)]
-                    if (present(q)) then
-                        q(1, l) = bodies%q(l, 0)
-                        q(1 + one%order, l) = [bodies%q(l, 1), bodies%q(l, 2), one%parity*bodies%q(l, 3)]
-                    end if
-                else if (present(q)) then
-                    call flow_body(one, h, m(:, l), code, q(:, l))
-                    refused = max(refused, code)
-                else
-                    call flow_body(one, h, m(:, l), code)
-                    refused = max(refused, code)
-                end if
-            end associate
+            good(l) = abs(block%lane(l)) > 0.5_wp
+            if (good(l)) good(l) = is_plain(m(:, l))
+            if (good(l) .and. present(q)) good(l) = is_plain(q(:, l))
+            copy_m(:, l) = 0.0_wp
+            copy_q(:, l) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+            if (.not. good(l)) cycle
+            copy_m(:, l) = m(:, l)
+            if (present(q)) copy_q(:, l) = q(:, l)
         end do
-    end subroutine store_block
+        copy_m(:, count + 1:full) = spread(copy_m(:, count), 2, full - count)
+        copy_q(:, count + 1:full) = spread(copy_q(:, count), 2, full - count)
+        call load_momenta(full, block, copy_m, x, served)
+        call step_lanes(full, present(q), block, x, work, served)
+        if (present(q)) call turn_attitudes(full, block, work, refused, copy_q)
+        call store_momenta(full, block, work, x, copy_m)
+        do l = 1, count
+            code = status_ok
+            if (good(l) .and. is_served(work%reach(l))) then
+                m(:, l) = copy_m(:, l)
+                if (present(q)) q(:, l) = copy_q(:, l)
+            else
+                associate (one => body(min(bodies, first + l - 1)), time => h(min(times, first + l - 1)))
+                    if (present(q)) then
+                        call flow_body(one, time, m(:, l), code, q(:, l))
+                    else
+                        call flow_body(one, time, m(:, l), code)
+                    end if
+                end associate
+            end if
+            refused = max(refused, code)
+        end do
+    end subroutine flow_rows
 
-    !> Place of a value among three (findloc is not in Fortran 2008).
-    pure function findloc_of(values, value) result(place)
-        integer, intent(in) :: values(3), value
-        integer :: place
+    !> Whether components are finite, far from overflow and, in their sum, not below the smallest.
+    pure function is_plain(x) result(plain)
+        real(wp), intent(in) :: x(:)
+        logical :: plain
 
-        place = 1
-        if (values(2) == value) place = 2
-        if (values(3) == value) place = 3
-    end function findloc_of
+        plain = all(ieee_is_finite(x))
+        if (plain) plain = all(abs(x) < plain_largest) .and. sum(abs(x)) >= plain_smallest
+    end function is_plain
 
-    include 'plain_numbers.inc'
+    !> Whether twice each number is finite.
+    pure function all_finite(n, x) result(finite)
+        integer, intent(in) :: n
+        real(wp), intent(in) :: x(n)
+        logical :: finite
+        integer(int64) :: many
+        integer :: l
+
+        many = 0
+        do l = 1, n
+            many = many + merge(1_int64, 0_int64, ieee_is_finite(2*x(l)))
+        end do
+        finite = many == n
+    end function all_finite
+
+    !> Momenta as columns, each in the place of its cyclic axis if all bodies have the same; whether all are
+    !> finite and far from overflow.
+    subroutine load_momenta(n, block, m, x, plain)
+        integer, intent(in) :: n
+        type(block_of_bodies), intent(in) :: block
+        real(wp), intent(in) :: m(3, n)
+        real(wp), intent(inout) :: x(lanes, 3)
+        logical, intent(out) :: plain
+
+        call load(n, m, x(1, block%column(1)), x(1, block%column(2)), x(1, block%column(3)), plain)
+    end subroutine load_momenta
+
+    pure subroutine load(n, m, x1, x2, x3, plain)
+        integer, intent(in) :: n
+        real(wp), intent(in) :: m(3, n)
+        real(wp), intent(inout) :: x1(n), x2(n), x3(n)
+        logical, intent(out) :: plain
+        real(wp) :: m1, m2, m3, total
+        integer(int64) :: many
+        integer :: l
+
+        many = 0
+        do l = 1, n
+            m1 = m(1, l)
+            m2 = m(2, l)
+            m3 = m(3, l)
+            total = (0.25_wp*abs(m1) + 0.25_wp*abs(m2)) + 0.25_wp*abs(m3)       ! does not overflow
+            total = merge(plain_largest, total, ieee_is_nan(total))     ! comparing a NaN raises a flag
+            many = many + merge(1_int64, 0_int64, total < 0.25_wp*plain_largest)
+            x1(l) = m1
+            x2(l) = m2
+            x3(l) = m3
+        end do
+        plain = many == n
+    end subroutine load
+
+    !> Momenta and their increments together, back in the place of m.
+    subroutine store_momenta(n, block, work, x, m)
+        integer, intent(in) :: n
+        type(block_of_bodies), intent(in) :: block
+        type(workspace), intent(in) :: work
+        real(wp), intent(in) :: x(lanes, 3)
+        real(wp), intent(inout) :: m(3, n)
+
+        associate (c => block%column)
+            call store(n, x(1, c(1)), x(1, c(2)), x(1, c(3)), work%d(1, c(1)), work%d(1, c(2)), &
+                       work%d(1, c(3)), m)
+        end associate
+    end subroutine store_momenta
+
+    pure subroutine store(n, x1, x2, x3, d1, d2, d3, m)
+        integer, intent(in) :: n
+        real(wp), intent(in) :: x1(n), x2(n), x3(n), d1(n), d2(n), d3(n)
+        real(wp), intent(inout) :: m(3, n)
+        integer :: l
+
+        do l = 1, n
+            m(1, l) = x1(l) + d1(l)
+            m(2, l) = x2(l) + d2(l)
+            m(3, l) = x3(l) + d3(l)
+        end do
+    end subroutine store
+
+    !> q + q w. A body whose quaternion is zero is refused: it keeps its momentum too.
+    subroutine turn_attitudes(n, block, work, refused, q)
+        integer, intent(in) :: n
+        type(block_of_bodies), intent(in) :: block
+        type(workspace), intent(inout) :: work
+        integer, intent(inout) :: refused
+        real(wp), intent(inout) :: q(4, n)
+        integer :: zeros, l
+
+        call turn_rows(n, work%w0, work%w(1, block%column(1)), work%w(1, block%column(2)), &
+                       work%w(1, block%column(3)), q, zeros)
+        if (zeros == 0) return
+        refused = max(refused, status_bad_attitude)
+        do l = 1, n
+            if (maxval(abs(q(:, l))) <= 0.0_wp) work%d(l, :) = -0.0_wp      ! m + d is then m, of zeros too
+        end do
+    end subroutine turn_attitudes
+
+    pure subroutine turn_rows(n, w0, w1, w2, w3, q, zeros)
+        integer, intent(in) :: n
+        real(wp), intent(in) :: w0(n), w1(n), w2(n), w3(n)
+        real(wp), intent(inout) :: q(4, n)
+        integer, intent(out) :: zeros
+        real(wp) :: q0, q1, q2, q3
+        integer(int64) :: many
+        integer :: l
+
+        many = 0
+        do l = 1, n
+            q0 = q(1, l)
+            q1 = q(2, l)
+            q2 = q(3, l)
+            q3 = q(4, l)
+            many = many + merge(1_int64, 0_int64, (abs(q0) + abs(q1)) + (abs(q2) + abs(q3)) <= 0.0_wp)
+            call turn(w0(l), w1(l), w2(l), w3(l), q0, q1, q2, q3)
+            q(1, l) = q0
+            q(2, l) = q1
+            q(3, l) = q2
+            q(4, l) = q3
+        end do
+        zeros = int(many)
+    end subroutine turn_rows
+
+    include 'turn_formulas.inc'
 
 end module frb_flow_bodies

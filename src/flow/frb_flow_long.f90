@@ -206,6 +206,6 @@ contains
 
     include 'long_formulas.inc'
 
-    include 'turn_formulas.inc'
+    include 'join_formulas.inc'
 
 end module frb_flow_long

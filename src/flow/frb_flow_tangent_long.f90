@@ -310,7 +310,7 @@ contains
 
     include 'long_formulas.inc'
 
-    include 'turn_formulas.inc'
+    include 'join_formulas.inc'
 
     include 'tangent_formulas.inc'
 

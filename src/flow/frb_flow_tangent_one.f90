@@ -220,11 +220,15 @@ contains
 
     include 'orbit_formulas.inc'
 
+    include 'series_formulas.inc'
+
     include 'short_formulas.inc'
 
     include 'middle_formulas.inc'
 
     include 'turn_formulas.inc'
+
+    include 'join_formulas.inc'
 
     include 'reach_formulas.inc'
 
