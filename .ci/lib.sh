@@ -2,7 +2,8 @@
 #
 # Every gate is a shell function of .ci/gates/ (or any command). It runs in a copy of the tree of its own, with set -e,
 # without standard input, up to $slots at a time. A gate passes with exit code 0, is skipped with exit code $skip (its
-# last line says why), and fails with any other. Results are told in the order of the list, each when it is known.
+# last line says why), and fails with any other. Results are told in the order of the list, each when it is known, with
+# the time it took and the time it kept processors busy.
 # With FRB_CI_ONLY=TEXT only gates run that have this text in their names (and what all need).
 
 slots=${FRB_CI_SLOTS:-2}
@@ -11,6 +12,7 @@ skip=77
 passed=0
 failed=0
 begun=$SECONDS
+all_busy=0
 started=0
 told=0
 names=()
@@ -59,7 +61,7 @@ start() {
 }
 
 run_gate() {
-    local folder=$1 tree=$1/frb from=$SECONDS
+    local folder=$1 tree=$1/frb from=$SECONDS code
     case $2 in
         first) tree=$clone ;;
         *) copy_of_tree "$tree" ;;
@@ -67,7 +69,11 @@ run_gate() {
     shift 2
     # Not inside a condition, where bash forgets set -e.
     (set -e; cd "$tree"; "$@") >"$folder/log" 2>&1 </dev/null
-    printf '%d %d\n' $? $((SECONDS - from)) >"$folder/result.part"
+    code=$?
+    # The second line of `times` is that of the processes of this gate: XmY.Zs in programs, in the system.
+    times >"$folder/times"
+    awk -v code=$code -v wall=$((SECONDS - from)) -F '[ms ]+' \
+        'NR == 2 {printf "%d %d %.0f\n", code, wall, 60*($1 + $3) + $2 + $4}' "$folder/times" >"$folder/result.part"
     mv "$folder/result.part" "$folder/result"
     # Trees with their builds are large.
     [ "$tree" = "$clone" ] || rm -rf "$tree"
@@ -81,16 +87,17 @@ all_done() {
 
 # Tells the results that are known and whose turn it is.
 tell() {
-    local folder code seconds word
+    local folder code seconds busy word
     while [ "$told" -lt "$started" ] && [ -e "$work/$told/result" ]; do
         folder=$work/$told
-        read -r code seconds <"$folder/result"
+        read -r code seconds busy <"$folder/result"
+        all_busy=$((all_busy + busy))
         case $code in
             0) word=ok passed=$((passed + 1)) ;;
             "$skip") word=skipped ;;
             *) word=FAILED failed=$((failed + 1)) ;;
         esac
-        printf '%-7s %-62s %4d s\n' "$word" "${names[told]}" "$seconds"
+        printf '%-7s %-62s %4d s %4d s\n' "$word" "${names[told]}" "$seconds" "$busy"
         case $word in
             FAILED) grep -avE '^\[ *[0-9]+%\]' "$folder/log" | tail -n 25 | sed 's/^/        /' ;;
             skipped) tail -n 1 "$folder/log" | sed 's/^/        /' ;;
@@ -121,7 +128,7 @@ count_tests() {
 # The closing line; true when nothing failed.
 finish() {
     all_done
-    printf 'wall time %d s\n' $((SECONDS - begun))
+    printf 'wall time %d s, processors busy %d s\n' $((SECONDS - begun)) "$all_busy"
     printf '%d passed, %d failed\n' "$passed" "$failed"
     [ "$failed" = 0 ]
 }
@@ -142,9 +149,10 @@ apt_package() {
         command -v sudo >/dev/null || skipped "no $1, and no sudo to install it"
         as_root=(sudo -n)
     fi
-    "${as_root[@]}" apt-get update -qq || true
+    "${as_root[@]}" apt-get -o DPkg::Lock::Timeout=300 update -qq || true
     apt-cache show "$2" >/dev/null 2>&1 || skipped "no $1, and no package $2"
-    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$2"
+    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=300 install -y -qq \
+        --no-install-recommends "$2"
 }
 
 # records FILE LINES COLUMNS: the output has so many records, each of so many finite numbers.

@@ -33,7 +33,7 @@ versions_agree() {
     local version file
     version=$(sed -n 's/^version = "\(.*\)"$/\1/p' fpm.toml)
     [ -n "$version" ]
-    grep -q "version = '$version'\$" src/base/frb_version.f90
+    grep -q "version = '$version'\$" src/base/frb_release.f90
     for file in $(grep -rl --include='*.h' 'define FRB_VERSION ' src include 2>/dev/null); do
         grep -q "define FRB_VERSION \"$version\"" "$file" || { echo "$file: not $version"; return 1; }
     done
