@@ -52,11 +52,11 @@ contains
         type(tally), intent(inout) :: t
         character(*), parameter :: expected = 'quat_step: '
         character(500) :: program, line
-        integer :: unit, io, code
+        integer :: unit, io, code, command_code
 
         call get_command_argument(0, program)
         call execute_command_line("'"//trim(program)//"' --stop >build/stop.out 2>build/stop.err", &
-                                  exitstat=code)
+                                  exitstat=code, cmdstat=command_code)
         call t%equal('without-stat-the-exit-code-is-1', code, 1)
         open (newunit=unit, file='build/stop.err', status='old', action='read')
         read (unit, '(a)', iostat=io) line

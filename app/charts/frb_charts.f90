@@ -56,9 +56,9 @@ program frb_charts
     end if
     if (.not. has_quad) call refuse('the truth needs a compiler with quadruple precision')
     if (index(options%folder, "'") > 0) call refuse('a quote in the name of the folder')
-    call execute_command_line('mkdir -p '''//options%folder//'''', exitstat=code)
+    call execute_command_line('mkdir -p '''//options%folder//'''', exitstat=code, cmdstat=i)
     if (code /= 0) call refuse('cannot make the folder '//options%folder)
-    call execute_command_line('test -t 2', exitstat=code)
+    call execute_command_line('test -t 2', exitstat=code, cmdstat=i)
     options%terminal = code == 0
     do i = 1, size(names)
         if (.not. wanted(i)) cycle
