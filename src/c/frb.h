@@ -44,7 +44,8 @@ enum {
     FRB_BAD_SCHEME = 9,
     FRB_NO_PERIOD = 10,
     FRB_LAPACK_FAILED = 11,
-    FRB_STOPPED = 12
+    FRB_STOPPED = 12,
+    FRB_NOT_OFFERED = 13
 };
 
 /* A body from its principal moments, in any order, or from its inertia tensor, 3 x 3, symmetric, about the centre of
@@ -61,6 +62,11 @@ int frb_flow(const frb_body *body, double h, double m[3], double q[4]);
 /* Advances n bodies, in place. ldb = 0: all are *body; else body is an array. A body that is refused keeps its state,
  * the others go on, and the largest status comes back. */
 int frb_flow_many(const frb_body *body, size_t ldb, double h, size_t n, double *m, size_t ldm, double *q, size_t ldq);
+
+/* The same for one body, with its exact derivatives: transition is 6 x 6, row after row, by (m, theta), variations of the
+ * attitude being rotation vectors in body axes; by_moments (or NULL) is 6 x 3, by the moments, their axes held. */
+int frb_flow_tangent(const frb_body *body, double h, double m[3], double q[4], double transition[36],
+                     double by_moments[18]);
 
 /* One motion at many times: its constants, from the state at t = 0, then the state at n times of either sign. */
 int frb_motion_start(const frb_body *body, const double m[3], const double q[4], frb_motion *motion);

@@ -32,7 +32,7 @@ int main(void)
     const double up[3] = {0.0, 0.0, 1.0}, t[2] = {-3.7, 1000.0};
     frb_body body, turned, bodies[n];
     frb_motion motion;
-    double m[3], q[4], many_m[n][3], many_q[n][4], period, precession, time = 0.0;
+    double m[3], q[4], transition[36], by_moments[18], many_m[n][3], many_q[n][4], period, precession, time = 0.0;
     int i;
 
     if (frb_body_bytes() != sizeof body || frb_motion_bytes() != sizeof motion) {
@@ -68,5 +68,10 @@ int main(void)
     check(frb_integrate_top(&body, "srkn14", up, up, 0.1, 100, m, q, &time, NULL));
     say("top", m, 3);
     say("top", q, 4);
+    check(frb_flow_tangent(&turned, 2.0, m, q, transition, by_moments));
+    say("tangent", m, 3);
+    say("tangent", q, 4);
+    say("tangent", transition, 36);
+    say("tangent", by_moments, 18);
     return 0;
 }

@@ -1,14 +1,14 @@
 ! What a Fortran program gets from the installed library, as client.c prints it.
 program client
     use, intrinsic :: iso_fortran_env, only: int64
-    use frb, only: wp, rigid_body, free_flow, free_motion, heavy_top, integrate, splitting_scheme
+    use frb, only: wp, rigid_body, free_flow, flow_tangent, free_motion, heavy_top, integrate, splitting_scheme
     implicit none
     integer, parameter :: n = 40
     real(wp), parameter :: start(3) = [1.8_wp, 0.4_wp, -0.9_wp], none(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
     type(rigid_body) :: body, turned, bodies(n)
     type(free_motion) :: motion
     type(heavy_top) :: top
-    real(wp) :: m(3), q(4), many_m(3, n), many_q(4, n)
+    real(wp) :: m(3), q(4), many_m(3, n), many_q(4, n), transition(6, 6), by_moments(6, 3)
     integer :: i
 
     body = rigid_body([0.6_wp, 0.8_wp, 1.0_wp])
@@ -41,6 +41,11 @@ program client
     call integrate(body, splitting_scheme('srkn14'), top, 0.1_wp, 100, m, q)
     call say('top', m)
     call say('top', q)
+    call flow_tangent(turned, 2.0_wp, m, q, transition, by_moments)
+    call say('tangent', m)
+    call say('tangent', q)
+    call say('tangent', [transpose(transition)])
+    call say('tangent', [transpose(by_moments)])
 
 contains
 

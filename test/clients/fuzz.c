@@ -32,7 +32,7 @@ int main(void)
     const size_t ld = sizeof one[0]/sizeof(double);
     frb_body body, junk;
     frb_motion motion, junk_motion;
-    double m[3] = {1.8, 0.4, -0.9}, q[4] = {1.0, 0.0, 0.0, 0.0}, t = 1.0, axes[9], nan = 0.0;
+    double state[36], m[3] = {1.8, 0.4, -0.9}, q[4] = {1.0, 0.0, 0.0, 0.0}, t = 1.0, axes[9], nan = 0.0;
     double *few_m = malloc(3*n*sizeof *few_m), *few_q = malloc(4*n*sizeof *few_q);
     unsigned char *bytes = (unsigned char *)&junk, *motion_bytes = (unsigned char *)&junk_motion;
     unsigned seed = 1;
@@ -55,6 +55,11 @@ int main(void)
     is("flow of no attitude", frb_flow(&body, 1.0, m, NULL), FRB_OK);
     is("time is not a number", frb_flow(&body, nan, m, q), FRB_BAD_TIME);
 
+    is("tangent of no body", frb_flow_tangent(NULL, 1.0, m, q, state, NULL), FRB_BAD_MOMENTS);
+    is("tangent of no momentum", frb_flow_tangent(&body, 1.0, NULL, q, state, NULL), FRB_BAD_MOMENTUM);
+    is("tangent of no attitude", frb_flow_tangent(&body, 1.0, m, NULL, state, NULL), FRB_BAD_ATTITUDE);
+    is("tangent to nowhere", frb_flow_tangent(&body, 1.0, m, q, NULL, NULL), FRB_BAD_COUNT);
+    is("tangent", frb_flow_tangent(&body, 1.0, m, q, state, NULL), FRB_OK);
     is("n = 0", frb_flow_many(&body, 0, 1.0, 0, NULL, 3, NULL, 0), FRB_OK);
     is("many of no body", frb_flow_many(NULL, 0, 1.0, 1, m, 3, q, 4), FRB_BAD_MOMENTS);
     is("many of no momentum", frb_flow_many(&body, 0, 1.0, 1, NULL, 3, q, 4), FRB_BAD_MOMENTUM);
@@ -127,7 +132,8 @@ int main(void)
         }
         memcpy(bytes, motion_bytes, sizeof junk);
         calls++;
-        if (frb_flow(&junk, 1.0, m, q) == FRB_OK || frb_motion_at(&junk_motion, 1, &t, m, 3, q, 4) == FRB_OK ||
+        if (frb_flow(&junk, 1.0, m, q) == FRB_OK || frb_flow_tangent(&junk, 1.0, m, q, state, NULL) == FRB_OK ||
+            frb_motion_at(&junk_motion, 1, &t, m, 3, q, 4) == FRB_OK ||
             frb_flow_many(&junk, 0, 1.0, 1, m, 3, q, 4) == FRB_OK ||
             frb_integrate_top(&junk, "strang", up, up, 0.1, 1, m, q, NULL, NULL) == FRB_OK) {
             failures++;

@@ -58,6 +58,13 @@ run = frb.integrate(body, frb.HeavyTop(), 0.1, 100, m, q, every=30)
 say("top", run.m[-1])
 say("top", run.q[-1])
 assert run.t.shape == (5,) and run.m.shape == (5, 3) and (run.m[0] == m).all()
+m, q = run.m[-1].copy(), run.q[-1].copy()
+transition, by_moments = frb.flow_tangent(turned, 2.0, m, q)
+say("tangent", m)
+say("tangent", q)
+say("tangent", transition)
+say("tangent", by_moments)
+m, q = run.m[0], run.q[0]
 
 
 def torque(q, t):
@@ -72,6 +79,8 @@ refused(1, frb.RigidBody, [1.0, -1.0, 1.0])
 refused(2, frb.RigidBody, -np.eye(3))
 refused(5, frb.flow, body, float("nan"), m, q)
 refused(3, frb.flow, body, 1.0, m*np.nan, q)
+refused(5, frb.flow_tangent, body, float("inf"), m, q)
+refused(6, frb.flow_tangent, bodies, 1.0, m, q)
 refused(6, frb.flow, bodies, 1.0, m, q)
 refused(6, frb.flow, body, 1.0, many_m, q)
 refused(7, frb.integrate, body, frb.HeavyTop(), 0.1, 1, m, q, scheme="rk4")

@@ -25,7 +25,8 @@ from . import _frb
 from ._frb import FrbError, flow
 
 __version__: str = _frb.version()
-__all__ = ["FreeMotion", "FrbError", "HeavyTop", "RigidBodies", "RigidBody", "Trajectory", "flow", "integrate"]
+__all__ = ["FreeMotion", "FrbError", "HeavyTop", "RigidBodies", "RigidBody", "Trajectory", "flow", "flow_tangent",
+           "integrate"]
 
 Array = NDArray[np.float64]
 
@@ -85,6 +86,18 @@ class FreeMotion(_frb.Motion):
         q = np.empty((*times.shape, 4))
         self._at(times.reshape(-1, 1), m.reshape(-1, 3), q.reshape(-1, 4))
         return m, q
+
+
+def flow_tangent(body: RigidBody, h: float, m: Array, q: Array) -> tuple[Array, Array]:
+    """Advance one body as flow does, in place, and return the exact derivatives of the step.
+
+    The first, (6, 6), is by (m, theta); variations theta of the attitude are rotation vectors in body axes,
+    q + dq = q (1, theta/2). The second, (6, 3), is by the principal moments, their axes held.
+    """
+    transition = np.empty((6, 6))
+    by_moments = np.empty((6, 3))
+    _frb.flow_tangent(body, h, m, q, transition, by_moments)
+    return transition, by_moments
 
 
 @dataclass(frozen=True)
