@@ -1,7 +1,8 @@
 ! What a Fortran program gets from the installed library, as client.c prints it.
 program client
     use, intrinsic :: iso_fortran_env, only: int64
-    use frb, only: wp, rigid_body, free_flow, flow_tangent, free_motion, heavy_top, integrate, splitting_scheme
+    use frb, only: wp, rigid_body, free_flow, flow_tangent, free_motion, heavy_top, integrate, &
+        splitting_scheme
     implicit none
     integer, parameter :: n = 40
     real(wp), parameter :: start(3) = [1.8_wp, 0.4_wp, -0.9_wp], none(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
