@@ -2,16 +2,14 @@
 !> units of their own inherent sensitivity: 1 is what rounding the inputs costs anyone.
 module frb_tangent_cases
     use frb_free_flow, only: rigid_body
-    use frb_kinds, only: wp, unit_roundoff
+    use frb_kinds, only: wp, qp, unit_roundoff
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
     implicit none
     private
 
     public :: tangent_case, read_tangent_cases, read_tensor_cases, score_matrix
 
-    !> 22 digits are kept: scoring in double precision would add half a unit of its own.
-    integer, parameter, public :: qp = selected_real_kind(30)
-
+    !> 22 digits are kept where the compiler can: scoring in double precision adds half a unit of its own.
     type :: tangent_case
         character(20) :: group = ''
         type(rigid_body) :: body
