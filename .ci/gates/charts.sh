@@ -24,3 +24,31 @@ charts_refuse() {
     refused 'no such chart: nonsense' "$bin/frb_charts" nonsense
     refused 'needs a folder' "$bin/frb_charts" --out
 }
+
+# A disk that fills while a chart is made, at a table, a script or a picture: the run ends with exit code 1 and one line
+# on standard error, and what lies on the disk is whole.
+charts_meet_a_full_disk() {
+    local free file code
+    for free in 0 4 100 160 176 200 300 400 600 720; do
+        dd if=/dev/zero of=disk/filler bs=1k count=$((720 - free)) 2>/dev/null
+        code=0
+        "$bin/frb_charts" orbits --quick --out disk >charts.stdout 2>charts.stderr || code=$?
+        cat charts.stderr
+        [ $code = 1 ]
+        [ "$(wc -l <charts.stderr)" = 1 ]
+        rm disk/filler
+        for file in $(ls -A disk); do cmp "disk/$file" "whole/$file"; done
+        rm -f disk/*
+    done
+    # The limit of the shell, and a full standard output.
+    code=0
+    (ulimit -f 8; "$bin/frb_charts" orbits --quick --out limited >charts.stdout 2>charts.stderr) || code=$?
+    [ $code = 1 ]
+    [ "$(wc -l <charts.stderr)" = 1 ]
+    [ -z "$(ls -A limited)" ]
+    if "$bin/frb_charts" >/dev/full 2>/dev/null; then return 1; fi
+}
+charts_leave_no_part() {
+    "$bin/frb_charts" orbits --quick --out whole
+    with_small_disk 720 charts_meet_a_full_disk
+}

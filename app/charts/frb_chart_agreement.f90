@@ -3,7 +3,7 @@ module frb_chart_agreement
     use frb, only: wp
     use frb_chart_cost, only: measure_cost
     use frb_chart_methods, only: method, catalogue
-    use frb_chart_output, only: settings, open_table, say
+    use frb_chart_output, only: chart_file, settings, open_table, say
     implicit none
     private
 
@@ -22,7 +22,8 @@ contains
         type(method), allocatable :: methods(:)
         real(wp), allocatable :: first(:, :, :), second(:, :, :), apart(:, :)
         character(160) :: line
-        integer :: i, k, unit, worst(2)
+        type(chart_file) :: file
+        integer :: i, k, worst(2)
 
         allocate (methods, source=catalogue())
         call measure_cost(options, 'agreement, first', methods, first)
@@ -31,14 +32,15 @@ contains
         apart = max(first(relative, :, :)/second(relative, :, :), &
                     second(relative, :, :)/first(relative, :, :)) - 1
         call open_table(options, 'agreement', 'two measurements of the cost chart, one after the other', &
-            'method, h*omega, time relative to the cheapest dmv: first, second; how far they are apart', unit)
+            'method, h*omega, time relative to the cheapest dmv: first, second; how far they are apart', file)
         do i = 1, size(methods)
             do k = 1, size(first, 3)
-                write (unit, '(a14,es12.4,2f10.4,f9.4)') methods(i)%key, first(1, i, k), &
+                write (file%line, '(a14,es12.4,2f10.4,f9.4)') methods(i)%key, first(1, i, k), &
                     first(relative, i, k), second(relative, i, k), apart(i, k)
+                call file%put()
             end do
         end do
-        close (unit)
+        call file%finish()
         worst = maxloc(apart)
         write (line, '(2x,i0,a,i0,a,i0,a)') count(apart <= allowed), ' of ', size(apart), &
             ' ratios agree within ', nint(100*allowed), ' %'

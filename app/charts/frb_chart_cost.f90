@@ -2,7 +2,7 @@
 module frb_chart_cost
     use frb, only: wp
     use frb_chart_methods, only: method, catalogue, find_method, style, family_dmv, family_batch
-    use frb_chart_output, only: settings, open_table, open_script, draw, say, quantile
+    use frb_chart_output, only: chart_file, width, settings, open_table, open_script, draw, say, quantile
     use frb_chart_timing, only: workload, new_workload, time_over_steps
     use frb_chart_truth, only: new_case, errors_of
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
@@ -24,21 +24,23 @@ contains
         type(settings), intent(in) :: options
         type(method), allocatable :: methods(:)
         real(wp), allocatable :: table(:, :, :)
-        integer :: i, k, unit
+        type(chart_file) :: file
+        integer :: i, k
 
         allocate (methods, source=catalogue())
         call measure_cost(options, 'cost', methods, table)
         call open_table(options, 'cost', 'time per step against step size; a block per method', &
                         'h*omega, ns per step: median, quartiles, relative to the cheapest dmv: '// &
-                        'median, quartiles', unit)
+                        'median, quartiles', file)
         do i = 1, size(methods)
-            write (unit, '(a)') '# method: '//trim(methods(i)%key)
+            call file%put('# method: '//trim(methods(i)%key))
             do k = 1, size(table, 3)
-                write (unit, '(es12.4,3f12.2,3f10.4)') table(:, i, k)
+                write (file%line, '(es12.4,3f12.2,3f10.4)') table(:, i, k)
+                call file%put()
             end do
-            write (unit, '(/)')
+            call file%end_block()
         end do
-        close (unit)
+        call file%finish()
         call draw_cost(options, methods)
     end subroutine chart_cost
 
@@ -91,11 +93,11 @@ contains
         character(*), parameter :: shown(*) = [character(12) :: 'flow', 'flow-batch', 'flow-m', 'flow-a', &
             'quat_step', 'frb_step', 'quat_step-2', 'frb_step-2', 'dmv2', 'dmv6', 'dmv10', 'rotations2', &
             'rotations4', 'rk4', 'dp-6', 'dp-12']
-        integer :: unit, i, j
-        logical :: first
+        type(chart_file) :: file
+        integer :: i, j
 
-        call open_script(options, 'cost', 900, 620, unit)
-        write (unit, '(a)') 'set logscale xy', 'set format x "10^{%T}"', &
+        call open_script(options, 'cost', 900, 620, file)
+        call file%put_lines([character(width) :: 'set logscale xy', 'set format x "10^{%T}"', &
             'set xlabel "step size h {/Symbol w}  [rad]"', &
             'set ylabel "time per step / cheapest discrete Moser-Veselov"', &
             'set key outside right center vertical spacing 1.15 samplen 2.2 Left reverse', &
@@ -104,19 +106,17 @@ contains
             '"#0072B2"', &
             'set object 1 rectangle from 1.3,0.03 to 10,100 behind fillstyle solid noborder '// &
             'fillcolor rgb "#eef3f8"', 'set yrange [0.03:100]', 'set xrange [0.001:10]', &
-            'set arrow 1 from graph 0, first 1 to graph 1, first 1 nohead lc rgb "#666666" dt 3', 'plot \'
-        first = .true.
+            'set arrow 1 from graph 0, first 1 to graph 1, first 1 nohead lc rgb "#666666" dt 3', 'plot \'])
         do j = 1, size(shown)
             do i = 1, size(methods)
                 if (methods(i)%key /= shown(j)) cycle
-                if (.not. first) write (unit, '(a)') ', \'
-                first = .false.
-                write (unit, '(a,i0,a)', advance='no') '  "cost.dat" index ', i - 1, ' using 1:5'// &
-                    style(methods(i))
+                write (file%line, '(a,i0,a)') '  "cost.dat" index ', i - 1, ' using 1:5'// &
+                    style(methods(i))//', \'
+                call file%put()
             end do
         end do
-        write (unit, '(a)') ''
-        close (unit)
+        call file%put('  NaN notitle')
+        call file%finish()
         call draw(options, 'cost')
     end subroutine draw_cost
 
@@ -133,7 +133,8 @@ contains
         real(wp), allocatable :: steps(:), ns(:, :, :), ratios(:, :)
         character(200) :: line
         real(wp) :: error_m, error_q, width
-        integer :: i, k, unit
+        type(chart_file) :: file
+        integer :: i, k
 
         allocate (steps, source=all_steps(::merge(2, 1, options%quick)))
         allocate (works(size(names)), ns(size(names), size(steps), merge(5, 9, options%quick)))
@@ -147,7 +148,7 @@ contains
             'batch of 1000/cheapest dmv, batch of 1e6/cheapest dmv, batch of 1000/dmv2 over 1000 bodies, '// &
             'scalar flow over 1000 bodies/dmv10 over 1000 bodies, frb_step/flow, quat_step/flow, '// &
             'error of one step of dmv10 [rad] (it does not converge for long steps), spread: the largest '// &
-            'distance of the quartiles of a ratio of the row, over its median', unit)
+            'distance of the quartiles of a ratio of the row, over its median', file)
         call say('ratios; "1000" and "1e6": so many bodies; dmv: the cheapest order for one body')
         call say(' h omega   dmv2  dmv10   flow flow/dmv10 flow/dmv2  m/dmv10  1000/dmv   1e6/dmv  '// &
             '1000/1000  1000/1000  frb_step quat_step     dmv10  spread')
@@ -173,10 +174,10 @@ contains
                 write (line, '(es9.1,3f7.1,9f10.3,es10.1,f8.3)') steps(k), middle(dmv2), middle(dmv10), &
                     middle(flow), (middle(ratios(:, i)), i=1, 9), error_q, width
             end associate
-            write (unit, '(a)') trim(line)
+            call file%put(trim(line))
             call say(trim(line))
         end do
-        close (unit)
+        call file%finish()
         call table_of_long_steps(options)
     end subroutine chart_speed
 
@@ -188,7 +189,8 @@ contains
         type(workload) :: works(2)
         real(wp), allocatable :: steps(:), ns(:, :, :)
         character(120) :: line
-        integer :: k, unit
+        type(chart_file) :: file
+        integer :: k
 
         allocate (steps, source=all_steps(::merge(2, 1, options%quick)))
         allocate (ns(2, size(steps), merge(5, 9, options%quick)))
@@ -197,18 +199,18 @@ contains
         call open_table(options, 'long-steps', &
                         'time of one step of the free flow: median over the repetitions', &
                         'h*omega, quaternion [ns], momentum only [ns], quaternion/that of 1 rad, '// &
-                        'momentum only/that of 1 rad', unit)
+                        'momentum only/that of 1 rad', file)
         call say(' h omega     q ns     m ns  q/1 rad  m/1 rad')
         call time_over_steps(options, 'long-steps', works, steps, 2.0e-3_wp, merge(2, 10, options%quick), ns)
         associate (radian => ns(:, minloc(abs(steps - 1.0_wp), dim=1), :))
             do k = 1, size(steps)
                 write (line, '(es9.1,2f9.1,2f9.2)') steps(k), middle(ns(1, k, :)), middle(ns(2, k, :)), &
                     middle(ns(1, k, :)/radian(1, :)), middle(ns(2, k, :)/radian(2, :))
-                write (unit, '(a)') trim(line)
+                call file%put(trim(line))
                 call say(trim(line))
             end do
         end associate
-        close (unit)
+        call file%finish()
     end subroutine table_of_long_steps
 
     pure function middle(values) result(median)

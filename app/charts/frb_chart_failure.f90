@@ -3,7 +3,8 @@
 module frb_chart_failure
     use frb, only: wp
     use frb_chart_methods, only: method, catalogue, style, family_momentum, family_dp
-    use frb_chart_output, only: settings, open_table, open_script, draw, progress, quantile, say, either, &
+    use frb_chart_output, only: chart_file, width, settings, open_table, open_script, draw, progress, &
+        quantile, say, either, &
         uniform, random_direction
     use frb_chart_truth, only: free_case, new_case, add_sensitivity, errors_of
     use, intrinsic :: iso_fortran_env, only: int64
@@ -33,7 +34,8 @@ contains
         type(method), allocatable :: methods(:)
         type(free_case), allocatable :: cases(:, :)
         real(wp), allocatable :: distance(:), scores(:, :, :)
-        integer :: p, k, c, i, unit, per_point, points, worst(2)
+        type(chart_file) :: file
+        integer :: p, k, c, i, per_point, points, worst(2)
         character(200) :: line
 
         allocate (methods, source=chosen())
@@ -56,17 +58,18 @@ contains
                 'error in units of the inherent sensitivity '// &
                 'against '//trim(titles(p))//'; a block per method', &
                 'distance (0 drawn at 1e-17), median score, '// &
-                'largest score; 1e18: NaN or refused; approximate methods take steps of 0.02 rad', unit)
+                'largest score; 1e18: NaN or refused; approximate methods take steps of 0.02 rad', file)
             do i = 1, size(methods)
-                write (unit, '(a)') '# method: '//trim(methods(i)%key)
+                call file%put('# method: '//trim(methods(i)%key))
                 do k = 1, points
                     if (scores(2, i, k) < 0.0_wp) cycle
-                    write (unit, '(3es12.3)') merge(1.0e-17_wp, distance(k), distance(k) <= 0.0_wp), &
+                    write (file%line, '(3es12.3)') merge(1.0e-17_wp, distance(k), distance(k) <= 0.0_wp), &
                         scores(:, i, k)
+                    call file%put()
                 end do
-                write (unit, '(/)')
+                call file%end_block()
             end do
-            close (unit)
+            call file%finish()
             worst = [1, maxloc(scores(2, 1, :), dim=1)]
             write (line, '(a,2(a,es9.2))') '  '//names(p), ': free flow at most ', scores(2, 1, worst(2)), &
                 ' units, at ', distance(worst(2))
@@ -199,53 +202,60 @@ contains
             'dp-15', &
             'quat_step-1', 'quat_step-3', 'quat_step-f3', 'quat_step-f2', 'quat_step', 'frb_step', &
             'flow-batch', 'flow']
-        integer :: unit, p, i, j, entries
+        type(chart_file) :: file
+        integer :: p, i, j, entries
 
-        call open_script(options, 'failure', 1000, 1080, unit)
-        write (unit, '(a)') 'set multiplot title "Largest error of '//either(options%quick, '2', '7')// &
-            ' random cases; 1 unit: what rounding the inputs costs anyone"', 'set logscale xy', &
-            'set format y "10^{%T}"', 'set yrange [5e-3:1e19]', 'set ytics 1,1e4', &
-            'set ytics add ("NaN" 1e18)', 'unset key', &
-            'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0', 'set size 0.25,0.195'
+        call open_script(options, 'failure', 1000, 1080, file)
+        call file%put('set multiplot title "Largest error of '//either(options%quick, '2', '7')// &
+            ' random cases; 1 unit: what rounding the inputs costs anyone"')
+        call file%put_lines([character(width) :: 'set logscale xy', 'set format y "10^{%T}"', &
+            'set yrange [5e-3:1e19]', 'set ytics 1,1e4', 'set ytics add ("NaN" 1e18)', 'unset key', &
+            'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0', 'set size 0.25,0.195'])
         do p = 1, panels
             if (p == 9) then
-                write (unit, '(a)') 'set xrange [3e-9:3e8]', &
-                    'set xtics ("10^{-8}" 1e-8, "10^{-4}" 1e-4, "1" 1, '//'"10^4" 1e4, "10^8" 1e8)'
+                call file%put_lines([character(width) :: 'set xrange [3e-9:3e8]', &
+                    'set xtics ("10^{-8}" 1e-8, "10^{-4}" 1e-4, "1" 1, '//'"10^4" 1e4, "10^8" 1e8)'])
             else
-                write (unit, '(a)') 'set xrange [0.3:3e-18]', &
+                call file%put_lines([character(width) :: 'set xrange [0.3:3e-18]', &
                     'set xtics ("0" 1e-17, "10^{-15}" 1e-15, "10^{-10}" 1e-10, "10^{-5}" 1e-5, '// &
-                    '"10^{-1}" 1e-1)'
+                    '"10^{-1}" 1e-1)'])
             end if
-            write (unit, '(a,f6.4,a,f6.4)') 'set origin ', 0.075 + 0.315*mod(p - 1, 3), ',', &
+            write (file%line, '(a,f6.4,a,f6.4)') 'set origin ', 0.075 + 0.315*mod(p - 1, 3), ',', &
                 0.74 - 0.26*((p - 1)/3)
-            write (unit, '(a)') either(mod(p, 3) == 1, 'set ylabel "error  [units]" offset 1.2,0', &
-                'unset ylabel')
-            write (unit, '(a)') 'set title "'//trim(titles(p))//'" offset 0,-0.7', 'plot \', &
-                '  4 with filledcurves y1=1e-3 lc rgb "#eeeeee" notitle, \'
+            call file%put()
+            call file%put(either(mod(p, 3) == 1, 'set ylabel "error  [units]" offset 1.2,0', &
+                'unset ylabel'))
+            call file%put('set title "'//trim(titles(p))//'" offset 0,-0.7')
+            call file%put_lines([character(width) :: 'plot \', &
+                '  4 with filledcurves y1=1e-3 lc rgb "#eeeeee" notitle, \'])
             do j = 1, size(shown)
                 do i = 1, size(methods)
-                    if (methods(i)%key == shown(j)) write (unit, '(a,i0,a)') '  "failure-'//trim(names(p))// &
-                        '.dat" index ', i - 1, ' using 1:3'//style(methods(i), '')//', \'
+                    if (methods(i)%key == shown(j)) then
+                        write (file%line, '(a,i0,a)') '  "failure-'//trim(names(p))// &
+                            '.dat" index ', i - 1, ' using 1:3'//style(methods(i), '')//', \'
+                        call file%put()
+                    end if
                 end do
             end do
-            write (unit, '(a)') '  NaN notitle'
+            call file%put('  NaN notitle')
         end do
-        write (unit, '(a)') 'set origin 0.03,0.005', 'set size 0.94,0.16', 'unset border', 'unset tics', &
+        call file%put_lines([character(width) :: &
+            'set origin 0.03,0.005', 'set size 0.94,0.16', 'unset border', 'unset tics', &
             'unset ylabel', 'unset title', 'unset grid', 'unset logscale', 'set xrange [0:1]', &
             'set yrange [0:1]', &
             'set key center center maxrows 4 samplen 2.2 width -4 spacing 1.2 Left reverse', &
-            'plot NaN with boxes fs solid noborder lc rgb "#eeeeee" title "up to 4 units", \'
+            'plot NaN with boxes fs solid noborder lc rgb "#eeeeee" title "up to 4 units", \'])
         entries = 0
         do j = size(shown), 1, -1
             do i = 1, size(methods)
                 if (methods(i)%key == shown(j)) then
-                    write (unit, '(a)') '  NaN'//style(methods(i))//', \'
+                    call file%put('  NaN'//style(methods(i))//', \')
                     entries = entries + 1
                 end if
             end do
         end do
-        write (unit, '(a)') '  NaN notitle', 'unset multiplot'
-        close (unit)
+        call file%put_lines([character(width) :: '  NaN notitle', 'unset multiplot'])
+        call file%finish()
         call draw(options, 'failure')
     end subroutine draw_failure
 

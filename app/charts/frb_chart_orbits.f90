@@ -3,7 +3,7 @@
 module frb_chart_orbits
     use frb, only: wp, rigid_body, free_flow, quat_rotate
     use frb_chart_methods, only: method, advance, find_method
-    use frb_chart_output, only: settings, open_table, open_script, draw, either
+    use frb_chart_output, only: chart_file, width, settings, open_table, open_script, draw, either
     use frb_taylor_truth, only: qp, taylor_period
     implicit none
     private
@@ -22,22 +22,23 @@ contains
         type(rigid_body) :: body
         real(qp) :: period, turn(4)
         real(wp) :: m(3), start(3), h, angle
-        integer :: i, side, k, unit
+        type(chart_file) :: file
+        integer :: i, side, k
 
         body = rigid_body(moments)
         call open_table(options, 'orbits', &
             'polhodes of I = (1, 2, 3), |m| = 1, seen from (3, 2, 2) without '// &
             'perspective; a block per orbit, the four arcs of the separatrix first', &
-            'right, up, 1 if in front', unit)
+            'right, up, 1 if in front', file)
         ! (a1 - a2) m1^2 = (a2 - a3) m3^2 on the separatrix: each arc from the middle axis to its opposite.
         do i = 0, 3
             start = [merge(1, -1, i < 2)*0.5_wp, 0.0_wp, merge(1, -1, mod(i, 2) == 0)*sqrt(0.75_wp)]
             do side = -points, points
                 m = start
                 call free_flow(body, side*0.3_wp, m)
-                call put(unit, m)
+                call put(file, m)
             end do
-            write (unit, '(/)')
+            call file%end_block()
         end do
         do i = 1, size(angles)
             angle = angles(i)*acos(-1.0_wp)/180
@@ -50,39 +51,42 @@ contains
                 h = real(period, wp)/points
                 m = start
                 do k = 0, points
-                    call put(unit, m)
+                    call put(file, m)
                     call free_flow(body, h, m)
                 end do
-                write (unit, '(/)')
+                call file%end_block()
             end do
         end do
-        close (unit)
-        call open_script(options, 'orbits', 660, 600, unit)
-        write (unit, '(a)') 'unset border', 'unset tics', 'unset grid', 'set size ratio -1', 'unset key', &
+        call file%finish()
+        call open_script(options, 'orbits', 660, 600, file)
+        call file%put_lines([character(width) :: &
+            'unset border', 'unset tics', 'unset grid', 'set size ratio -1', 'unset key', &
             'set xrange [-1.2:1.5]', 'set yrange [-1.1:1.3]', &
             'set object 1 circle at 0,0 size first 1 fillstyle solid border lc rgb "#888888" fc rgb '// &
             '"#f4f4f4" behind', &
-            'set title "Momentum of a free body, I = (1, 2, 3): every orbit is one formula"'
-        call label_axis(unit, [1.0_wp, 0.0_wp, 0.0_wp], 'axis 1')
-        call label_axis(unit, [0.0_wp, 1.0_wp, 0.0_wp], 'axis 2 (unstable)')
-        call label_axis(unit, [0.0_wp, 0.0_wp, 1.0_wp], 'axis 3')
-        write (unit, '(a)') 'set label 99 "separatrix" tc rgb "#D55E00" at graph 0.02,0.06 front', 'plot \', &
+            'set title "Momentum of a free body, I = (1, 2, 3): every orbit is one formula"'])
+        call label_axis(file, [1.0_wp, 0.0_wp, 0.0_wp], 'axis 1')
+        call label_axis(file, [0.0_wp, 1.0_wp, 0.0_wp], 'axis 2 (unstable)')
+        call label_axis(file, [0.0_wp, 0.0_wp, 1.0_wp], 'axis 3')
+        call file%put_lines([character(width) :: &
+            'set label 99 "separatrix" tc rgb "#D55E00" at graph 0.02,0.06 front', 'plot \', &
             '  for [k=4:27] "orbits.dat" index k using 1:($3<1?$2:NaN) with lines lc rgb "#cfdbe6" lw 1, \', &
             '  for [k=0:3] "orbits.dat" index k using 1:($3<1?$2:NaN) with lines lc rgb "#f0c9b0" lw 2, \', &
             '  for [k=4:27] "orbits.dat" index k using 1:($3>0?$2:NaN) with lines lc rgb "#0072B2" lw 2, \', &
-            '  for [k=0:3] "orbits.dat" index k using 1:($3>0?$2:NaN) with lines lc rgb "#D55E00" lw 4'
-        close (unit)
+            '  for [k=0:3] "orbits.dat" index k using 1:($3>0?$2:NaN) with lines lc rgb "#D55E00" lw 4'])
+        call file%finish()
         call draw(options, 'orbits')
     end subroutine chart_orbits
 
     !> One point of a curve on the sphere.
-    subroutine put(unit, m)
-        integer, intent(in) :: unit
+    subroutine put(file, m)
+        type(chart_file), intent(inout) :: file
         real(wp), intent(in) :: m(3)
         real(wp) :: seen(3)
 
         seen = view(m)
-        write (unit, '(2f9.5,i3)') seen(1:2), merge(1, 0, seen(3) > 0.0_wp)
+        write (file%line, '(2f9.5,i3)') seen(1:2), merge(1, 0, seen(3) > 0.0_wp)
+        call file%put()
     end subroutine put
 
     !> Right, up and towards the eye, for an eye in the direction (3, 2, 2) with axis 3 upright.
@@ -97,18 +101,21 @@ contains
         seen = [dot_product(right, m), dot_product(up, m), dot_product(eye, m)]
     end function view
 
-    subroutine label_axis(unit, axis, text)
-        integer, intent(in) :: unit
+    subroutine label_axis(file, axis, text)
+        type(chart_file), intent(inout) :: file
         real(wp), intent(in) :: axis(3)
         character(*), intent(in) :: text
         real(wp) :: tip(3), out(3)
 
         tip = view(axis)
         out = view(1.35_wp*axis)
-        write (unit, '(4(a,f7.3),a)') 'set arrow from ', tip(1), ',', tip(2), ' to ', out(1), ',', out(2), &
+        write (file%line, '(4(a,f7.3),a)') 'set arrow from ', tip(1), ',', tip(2), ' to ', out(1), ',', &
+            out(2), &
             ' head filled size 0.04,20 lc rgb "#000000" lw 2 front'
-        write (unit, '(a,f7.3,a,f7.3,a)') 'set label "'//text//'" at ', out(1), ',', out(2), &
+        call file%put()
+        write (file%line, '(a,f7.3,a,f7.3,a)') 'set label "'//text//'" at ', out(1), ',', out(2), &
             ' '//either(tip(1) > 0.5_wp, 'center offset 0,-1.0', 'center offset 0,0.9')//' front'
+        call file%put()
     end subroutine label_axis
 
     !> The tennis racket turned about its middle axis: flips, and how well methods keep energy and momentum.
@@ -121,31 +128,36 @@ contains
         integer, parameter :: points(*) = [7, 4, 2, 1]
         type(method) :: with
         real(wp) :: m(3), q(4), energy0, energy, space(3)
-        integer :: i, k, unit
+        type(chart_file) :: file
+        integer :: i, k
 
         call open_table(options, 'racket', &
             'tennis racket, I = (3, 5, 9), m = (0, 2, 0.01) at the start, steps of 0.1; '// &
             'a block per method', &
             't, omega1, omega2, omega3, relative error of the energy, error of the momentum '// &
-            'in space over its norm', unit)
+            'in space over its norm', file)
         energy0 = sum(m0**2/moments)/2
         do i = 1, size(keys)
             with = find_method(trim(keys(i)))
             m = m0
             q = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-            write (unit, '(a)') '# method: '//trim(keys(i))
+            call file%put('# method: '//trim(keys(i)))
             do k = 0, steps
                 energy = sum(m**2/moments)/2
                 space = quat_rotate(q, m) - m0
-                if (mod(k, 2) == 0) write (unit, '(f7.2,3f10.6,2es11.3)') k*h, m/moments, &
-                    max(1.0e-17_wp, abs(energy/energy0 - 1)), max(1.0e-17_wp, norm2(space)/norm2(m0))
+                if (mod(k, 2) == 0) then
+                    write (file%line, '(f7.2,3f10.6,2es11.3)') k*h, m/moments, &
+                        max(1.0e-17_wp, abs(energy/energy0 - 1)), max(1.0e-17_wp, norm2(space)/norm2(m0))
+                    call file%put()
+                end if
                 call advance(with, moments, h, 1, m, q)
             end do
-            write (unit, '(/)')
+            call file%end_block()
         end do
-        close (unit)
-        call open_script(options, 'racket', 900, 640, unit)
-        write (unit, '(a)') 'set multiplot', 'set xrange [0:100]', 'set lmargin at screen 0.1', &
+        call file%finish()
+        call open_script(options, 'racket', 900, 640, file)
+        call file%put_lines([character(width) :: &
+            'set multiplot', 'set xrange [0:100]', 'set lmargin at screen 0.1', &
             'set rmargin at screen 0.97', 'set bmargin at screen 0.56', 'set tmargin at screen 0.92', &
             'set title "Tennis racket spun about its middle axis: a flip every half period" offset 0,-0.5', &
             'set ylabel "{/Symbol w}  [rad per unit of time]"', 'set yrange [-0.52:0.62]', &
@@ -156,16 +168,17 @@ contains
             'unset title', 'set bmargin at screen 0.11', 'set tmargin at screen 0.53', 'set logscale y', &
             'set format x "%g"', 'set format y "10^{%T}"', 'set yrange [5e-18:1e1]', 'set xlabel "time"', &
             'set ytics 1e-16,1e4', 'set ylabel "relative error of energy"', &
-            'set key top center horizontal', 'plot \'
+            'set key top center horizontal', 'plot \'])
         do i = 1, size(keys)
             with = find_method(trim(keys(i)))
-            write (unit, '(a,i0,a,i0,a,i0,a,i0,a)') '  "racket.dat" index ', i - 1, &
+            write (file%line, '(a,i0,a,i0,a,i0,a,i0,a)') '  "racket.dat" index ', i - 1, &
                 ' using 1:5 every 5 with points lt ', &
                 with%colour, ' pt ', points(i), ' ps ', 1, '*0.5 title "'//trim(with%label)// &
                 '"'//either(i == size(keys), '', ', \')
+            call file%put()
         end do
-        write (unit, '(a)') 'unset multiplot'
-        close (unit)
+        call file%put('unset multiplot')
+        call file%finish()
         call draw(options, 'racket')
     end subroutine chart_racket
 

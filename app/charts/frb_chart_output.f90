@@ -1,14 +1,21 @@
 !> What every chart shares: tables with a header that says where they come from, pictures through gnuplot,
-!> progress on a terminal, medians and reproducible random numbers.
+!> progress on a terminal, medians and reproducible random numbers. A file that cannot be written ends the
+!> program; what has its name is complete.
 module frb_chart_output
     use frb, only: wp
+    use frb_out_files, only: out_file
+    use frb_system, only: c_exit, c_getpid
     use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
+    use, intrinsic :: iso_c_binding, only: c_int
     use, intrinsic :: iso_fortran_env, only: compiler_options, compiler_version, error_unit, int64
     implicit none
     private
 
-    public :: settings, open_table, open_script, draw, progress, say, either, sorted, quantile, uniform, &
-        random_direction
+    public :: settings, chart_file, width, open_table, open_script, draw, progress, say, give_up, either, &
+        sorted, quantile, uniform, random_direction
+
+    !> Longest line of a table or a script.
+    integer, parameter :: width = 400
 
     !> What the command line asks for.
     type :: settings
@@ -17,55 +24,125 @@ module frb_chart_output
         character(:), allocatable :: folder         !! where tables and pictures go
     end type settings
 
+    !> A table or a script that is being written.
+    type, extends(out_file) :: chart_file
+        character(width) :: line            !! what `put` writes
+    contains
+        procedure :: begin
+        procedure :: put
+        procedure :: put_lines
+        procedure :: end_block
+        procedure :: finish
+    end type chart_file
+
     !> Okabe and Ito's palette, which colour-blind readers can tell apart, and shared settings.
     character(*), parameter :: palette(*) = [character(9) :: '"#000000"', '"#D55E00"', '"#0072B2"', &
         '"#009E73"', '"#CC79A7"', '"#E69F00"', '"#56B4E9"', '"#999999"']
 
 contains
 
+    !> Opens the file.
+    subroutine begin(self, path)
+        class(chart_file), intent(inout) :: self
+        character(*), intent(in) :: path
+        character(:), allocatable :: error
+
+        call self%open_for_writing(path, error)
+        if (allocated(error)) call give_up(error)
+    end subroutine begin
+
+    !> Writes a line: this text, or the component `line`.
+    subroutine put(self, text)
+        class(chart_file), intent(inout) :: self
+        character(*), intent(in), optional :: text
+
+        if (present(text)) then
+            call self%write_line(text)
+        else
+            call self%write_line(trim(self%line))
+        end if
+    end subroutine put
+
+    !> Writes lines.
+    subroutine put_lines(self, lines)
+        class(chart_file), intent(inout) :: self
+        character(*), intent(in) :: lines(:)
+        integer :: i
+
+        do i = 1, size(lines)
+            call self%put(trim(lines(i)))
+        end do
+    end subroutine put_lines
+
+    !> Ends a block of a table, as gnuplot counts them.
+    subroutine end_block(self)
+        class(chart_file), intent(inout) :: self
+
+        call self%put('')
+        call self%put('')
+    end subroutine end_block
+
+    !> Gives the file its name.
+    subroutine finish(self)
+        class(chart_file), intent(inout) :: self
+        character(:), allocatable :: error
+
+        call self%commit(error)
+        if (allocated(error)) call give_up(error)
+    end subroutine finish
+
     !> Opens the table FOLDER/NAME.dat and writes its header: title, machine, compiler, flags, columns.
-    subroutine open_table(options, name, title, columns, unit)
+    subroutine open_table(options, name, title, columns, file)
         type(settings), intent(in) :: options
         character(*), intent(in) :: name, title
         character(*), intent(in) :: columns         !! names and units of the columns
-        integer, intent(out) :: unit
+        type(chart_file), intent(out) :: file
 
-        open (newunit=unit, file=options%folder//'/'//name//'.dat', status='replace', action='write')
-        write (unit, '(a)') '# '//title
-        write (unit, '(a)') '# made by: frb_charts'//either(options%quick, ' --quick', '')
-        write (unit, '(a)') '# processor: '//processor()
-        write (unit, '(a)') '# compiler: '//compiler_version()
-        write (unit, '(a)') '# flags: '//flags()
-        write (unit, '(a)') '# columns: '//columns
+        call file%begin(options%folder//'/'//name//'.dat')
+        call file%put('# '//title)
+        call file%put('# made by: frb_charts'//either(options%quick, ' --quick', ''))
+        call file%put('# processor: '//processor())
+        call file%put('# compiler: '//compiler_version())
+        call file%put('# flags: '//flags())
+        call file%put('# columns: '//columns)
     end subroutine open_table
 
     !> Opens the gnuplot script FOLDER/NAME.gp and writes what every script begins with: an SVG of the given
     !> size (a PNG when called as `gnuplot -e "format='png'" NAME.gp`), one font, colours as line types.
-    subroutine open_script(options, name, width, height, unit)
+    subroutine open_script(options, name, across, height, file)
         type(settings), intent(in) :: options
         character(*), intent(in) :: name
-        integer, intent(in) :: width, height        !! of the picture [pixels]
-        integer, intent(out) :: unit
+        integer, intent(in) :: across, height       !! of the picture [pixels]
+        type(chart_file), intent(out) :: file
         integer :: i
 
-        open (newunit=unit, file=options%folder//'/'//name//'.gp', status='replace', action='write')
-        write (unit, '(a)') '# drawn by: gnuplot '//name//'.gp, in the folder of the tables'
-        write (unit, '(a,i0,a,i0,a)') 'if (!exists("format")) set terminal svg size ', width, ',', height, &
-            ' font "Helvetica,15" background "#ffffff"; set output "'//name//'.svg"'
-        write (unit, '(a,i0,a,i0,a)') 'if (exists("format")) set terminal pngcairo size ', width, ',', &
-            height, ' font "Helvetica,12"; set output "'//name//'.png"'
+        call file%begin(options%folder//'/'//name//'.gp')
+        call file%put('# drawn by: gnuplot '//name//'.gp, in the folder of the tables')
+        write (file%line, '(2(a,i0),a)') 'if (!exists("format")) set terminal svg size ', across, ',', &
+            height, &
+            ' font "Helvetica,15" background "#ffffff"'
+        call file%put()
+        write (file%line, '(2(a,i0),a)') 'if (exists("format")) set terminal pngcairo size ', across, ',', &
+            height, ' font "Helvetica,12"'
+        call file%put()
+        call file%put('if (!exists("picture")) picture = "'//name//'".(exists("format") ? ".png" : ".svg")')
+        call file%put('set output picture')
         do i = 1, size(palette)
-            write (unit, '(a,i0,a)') 'set linetype ', i, ' lc rgb '//trim(palette(i))//' lw 2 pt 7 ps 0.5'
+            write (file%line, '(a,i0,a)') 'set linetype ', i, ' lc rgb '//trim(palette(i))// &
+                ' lw 2 pt 7 ps 0.5'
+            call file%put()
         end do
-        write (unit, '(a)') 'set grid lc rgb "#dddddd" lw 1 lt 1'
-        write (unit, '(a)') 'set border lc rgb "#444444"'
-        write (unit, '(a)') 'set tics nomirror'
+        call file%put('set grid lc rgb "#dddddd" lw 1 lt 1')
+        call file%put('set border lc rgb "#444444"')
+        call file%put('set tics nomirror')
     end subroutine open_script
 
     !> Runs gnuplot on FOLDER/NAME.gp; without gnuplot the tables and the script stay.
     subroutine draw(options, name)
         type(settings), intent(in) :: options
         character(*), intent(in) :: name
+        character(:), allocatable :: part
+        character(12) :: process
         integer :: code, command_code
 
         call execute_command_line('command -v gnuplot > /dev/null', exitstat=code, cmdstat=command_code)
@@ -74,22 +151,37 @@ contains
                 '.gp: not drawn, there is no gnuplot; table and script are kept')
             return
         end if
-        call execute_command_line('cd '''//options%folder//''' && gnuplot '//name//'.gp', exitstat=code, &
-                                  cmdstat=command_code)
-        if (command_code == 0 .and. code == 0) then
-            call say('  '//options%folder//'/'//name//'.svg')
-        else
-            call say('  '//options%folder//'/'//name//'.gp: gnuplot failed; table and script are kept')
+        ! gnuplot does not tell when the disk is full: what it made gets its name if it is whole.
+        write (process, '(i0)') c_getpid()
+        part = 'frb-'//trim(process)//'.part'
+        call execute_command_line('cd '''//options%folder//''' && { gnuplot -e "picture='''//part//'''" '// &
+            name//'.gp && tail -c 16 '//part//' | grep -q "</svg>" && mv -f '//part//' '//name//'.svg || '// &
+            '{ rm -f '//part//'; false; }; } 2> /dev/null', exitstat=code, cmdstat=command_code)
+        if (command_code /= 0 .or. code /= 0) then
+            call give_up(options%folder//'/'//name//'.svg: cannot be drawn (is the disk full?); gnuplot '// &
+                         name//'.gp tells more')
         end if
+        call say('  '//options%folder//'/'//name//'.svg')
     end subroutine draw
 
     !> One line on standard output.
     subroutine say(line)
         character(*), intent(in) :: line
+        type(chart_file) :: file
 
-        write (*, '(a)') line
-        flush (6)
+        call file%begin('-')
+        call file%put(line)
+        call file%finish()
     end subroutine say
+
+    !> Ends the program: one line on standard error, exit code 1.
+    subroutine give_up(message)
+        character(*), intent(in) :: message
+
+        write (error_unit, '(a)') 'frb_charts: '//message
+        flush (error_unit)
+        call c_exit(1_c_int)
+    end subroutine give_up
 
     !> One text or the other.
     pure function either(condition, yes, no) result(text)

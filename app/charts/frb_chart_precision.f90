@@ -4,7 +4,8 @@ module frb_chart_precision
     use frb, only: wp
     use frb_chart_methods, only: method, catalogue, style, family_flow, family_batch, family_momentum, &
         family_matrix, family_dp, family_paper_a, family_paper_q
-    use frb_chart_output, only: settings, open_table, open_script, draw, progress, either, &
+    use frb_chart_output, only: chart_file, width, settings, open_table, open_script, draw, progress, &
+        either, &
         quantile, uniform, random_direction
     use frb_chart_timing, only: workload, new_workload, time_in_turn
     use frb_chart_truth, only: free_case, new_case, errors_of
@@ -36,7 +37,8 @@ contains
         type(method), allocatable :: methods(:)
         type(point), allocatable :: points(:, :)
         integer, allocatable :: counts(:)
-        integer :: b, unit
+        type(chart_file) :: file
+        integer :: b
 
         allocate (methods, source=curves())
         allocate (points(16, size(methods)), counts(size(methods)))
@@ -46,10 +48,11 @@ contains
                 'errors at t = 10 against the time to get there, from m = (1.8, 0.4, -0.9); a block '// &
                 'per method, '// &
                 'last the envelope', 'number of steps or tolerance; time [ns]: median, quartiles; '// &
-                'error of attitude [rad]; error of momentum', unit)
-            write (unit, '(a,3f8.4)') '# moments:', bodies(:, b)
-            call write_points(unit, methods, points, counts)
-            close (unit)
+                'error of attitude [rad]; error of momentum', file)
+            write (file%line, '(a,3f8.4)') '# moments:', bodies(:, b)
+            call file%put()
+            call write_points(file, methods, points, counts)
+            call file%finish()
         end do
         call draw_work_precision(options, methods, names, bodies)
     end subroutine chart_work_precision
@@ -141,8 +144,8 @@ contains
     end subroutine measure
 
     !> The blocks of a table, and at its end the envelope: points that no other beats in both respects.
-    subroutine write_points(unit, methods, points, counts)
-        integer, intent(in) :: unit
+    subroutine write_points(file, methods, points, counts)
+        type(chart_file), intent(inout) :: file
         type(method), intent(in) :: methods(:)
         type(point), intent(in) :: points(:, :)
         integer, intent(in) :: counts(:)
@@ -150,14 +153,15 @@ contains
         integer :: i, k, place(2)
 
         do i = 1, size(methods)
-            write (unit, '(a)') '# method: '//trim(methods(i)%key)
+            call file%put('# method: '//trim(methods(i)%key))
             do k = 1, counts(i)
-                write (unit, '(es10.2,3es13.4,2es12.3)') points(k, i)%setting, points(k, i)%ns, &
+                write (file%line, '(es10.2,3es13.4,2es12.3)') points(k, i)%setting, points(k, i)%ns, &
                     max(floor_of_errors, points(k, i)%error_q), max(floor_of_errors, points(k, i)%error_m)
+                call file%put()
             end do
-            write (unit, '(/)')
+            call file%end_block()
         end do
-        write (unit, '(a)') '# envelope: time [ns], error of attitude [rad], method'
+        call file%put('# envelope: time [ns], error of attitude [rad], method')
         best_error = 1.0e3_wp
         last_time = 0.0_wp
         do
@@ -173,12 +177,17 @@ contains
                 end do
             end do
             if (place(1) == 0) exit
-            if (last_time <= 0.0_wp) write (unit, '(2es13.4,a)') time, best_error, ' top'
+            if (last_time <= 0.0_wp) then
+                write (file%line, '(2es13.4,a)') time, best_error, ' top'
+                call file%put()
+            end if
             best_error = max(floor_of_errors, points(place(1), place(2))%error_q)
             last_time = time
-            write (unit, '(2es13.4,1x,a)') time, best_error, trim(methods(place(2))%key)
+            write (file%line, '(2es13.4,1x,a)') time, best_error, trim(methods(place(2))%key)
+            call file%put()
         end do
-        write (unit, '(2es13.4,a)') 1.0e9_wp, best_error, ' right'
+        write (file%line, '(2es13.4,a)') 1.0e9_wp, best_error, ' right'
+        call file%put()
     end subroutine write_points
 
     subroutine draw_work_precision(options, methods, names, bodies)
@@ -187,42 +196,49 @@ contains
         character(*), intent(in) :: names(:)
         real(wp), intent(in) :: bodies(:, :)
         character(60) :: title
-        integer :: unit, b, i
+        type(chart_file) :: file
+        integer :: b, i
 
-        call open_script(options, 'work-precision', 1000, 940, unit)
-        write (unit, '(a)') 'set multiplot', 'set logscale xy', 'set format x "10^{%T}"', &
+        call open_script(options, 'work-precision', 1000, 940, file)
+        call file%put_lines([character(width) :: &
+            'set multiplot', 'set logscale xy', 'set format x "10^{%T}"', &
             'set format y "10^{%T}"', &
             'set yrange [1e-16:30]', 'set xrange [10:5e6]', 'set ytics 1e-16,1e2', &
             'set xlabel "time spent to reach t = 10  [ns]" offset 0,0.4', &
             'set ylabel "error of attitude  [rad]"', &
-            'unset key', 'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0'
+            'unset key', 'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0'])
         do b = 1, size(names)
             write (title, '(a,2(f5.3,a),f5.3,a)') ': I = (', bodies(1, b), ', ', bodies(2, b), ', ', &
                 bodies(3, b), ')'
-            write (unit, '(a)') 'set title "'//trim(names(b))//' body'//trim(title)//'" offset 0,-0.6'
-            write (unit, '(a,f5.3,a,f5.3)') 'set origin ', merge(0.08, 0.58, mod(b, 2) == 1), ',', &
+            call file%put('set title "'//trim(names(b))//' body'//trim(title)//'" offset 0,-0.6')
+            write (file%line, '(a,f5.3,a,f5.3)') 'set origin ', merge(0.08, 0.58, mod(b, 2) == 1), ',', &
                 merge(0.56, 0.07, b < 3)
-            write (unit, '(a)') 'set size 0.40,0.40', 'plot \'
-            write (unit, '(a,i0,a)') '  "work-precision-'//trim(names(b))//'.dat" index ', size(methods), &
+            call file%put()
+            call file%put_lines([character(width) :: 'set size 0.40,0.40', 'plot \'])
+            write (file%line, '(a,i0,a)') '  "work-precision-'//trim(names(b))//'.dat" index ', &
+                size(methods), &
                 ' using 1:2 with steps lc rgb "#dddddd" lw 10 notitle, \'
+            call file%put()
             do i = size(methods), 1, -1
                 if (.not. drawn(methods(i))) cycle
-                write (unit, '(a,i0,a)') '  "work-precision-'//trim(names(b))//'.dat" index ', i - 1, &
+                write (file%line, '(a,i0,a)') '  "work-precision-'//trim(names(b))//'.dat" index ', i - 1, &
                     ' using 2:5'//style(methods(i), '')//either(i == 1, '', ', \')
+                call file%put()
             end do
         end do
-        write (unit, '(a)') 'set origin 0.53,0.05', 'set size 0.47,0.45', 'unset border', 'unset tics', &
+        call file%put_lines([character(width) :: &
+            'set origin 0.53,0.05', 'set size 0.47,0.45', 'unset border', 'unset tics', &
             'unset xlabel', &
             'unset ylabel', 'unset title', 'unset grid', 'unset logscale', 'set xrange [0:1]', &
             'set yrange [0:1]', &
             'set key center center maxrows 12 samplen 2.2 spacing 1.1 Left reverse', 'plot \', &
-            '  NaN with lines lc rgb "#dddddd" lw 10 title "lower left envelope", \'
+            '  NaN with lines lc rgb "#dddddd" lw 10 title "lower left envelope", \'])
         do i = 1, size(methods)
             if (.not. drawn(methods(i))) cycle
-            write (unit, '(a)') '  NaN'//style(methods(i))//either(i == size(methods), '', ', \')
+            call file%put('  NaN'//style(methods(i))//either(i == size(methods), '', ', \'))
         end do
-        write (unit, '(a)') 'unset multiplot'
-        close (unit)
+        call file%put('unset multiplot')
+        call file%finish()
         call draw(options, 'work-precision')
     end subroutine draw_work_precision
 
@@ -235,7 +251,8 @@ contains
         real(wp), allocatable :: errors(:, :)
         real(wp) :: moments(3), m0(3), x
         integer(int64) :: seed
-        integer :: b, i, k, n, unit, most
+        type(chart_file) :: file
+        integer :: b, i, k, n, most
 
         allocate (methods, source=pack(curves(), drawn(curves())))
         allocate (cases(merge(5, 9, options%quick)))
@@ -254,41 +271,44 @@ contains
         call open_table(options, 'growth', &
             'errors at t = 16 against the number of steps, |m| = 1/2, median and '// &
             'largest over 9 bodies (5 with --quick); a block per method', &
-            'steps, error of attitude [rad]: median, '//'largest; error of momentum: median, largest', unit)
+            'steps, error of attitude [rad]: median, '//'largest; error of momentum: median, largest', file)
         do i = 1, size(methods)
             if (left_out(methods(i))) cycle
-            write (unit, '(a)') '# method: '//trim(methods(i)%key)
+            call file%put('# method: '//trim(methods(i)%key))
             do k = 0, most
                 n = nint(10.0_wp**(0.5_wp*k))
                 do b = 1, size(cases)
                     call errors_of(methods(i), cases(b), n, errors(1, b), errors(2, b))
                 end do
-                write (unit, '(i8,4es12.3)') n, max(floor_of_errors, quantile(errors(2, :), 0.5_wp)), &
+                write (file%line, '(i8,4es12.3)') n, max(floor_of_errors, quantile(errors(2, :), 0.5_wp)), &
                     max(floor_of_errors, maxval(errors(2, :))), max(floor_of_errors, quantile(errors(1, :), &
                     0.5_wp)), max(floor_of_errors, maxval(errors(1, :)))
+                call file%put()
                 call progress(options, 'growth', (i - 1)*(most + 1) + k + 1, size(methods)*(most + 1))
             end do
-            write (unit, '(/)')
+            call file%end_block()
         end do
-        close (unit)
+        call file%finish()
         call progress(options, 'growth', 1, 1)
-        call open_script(options, 'growth', 900, 640, unit)
-        write (unit, '(a)') 'set logscale xy', 'set format x "10^{%T}"', 'set format y "10^{%T}"', &
+        call open_script(options, 'growth', 900, 640, file)
+        call file%put_lines([character(width) :: &
+            'set logscale xy', 'set format x "10^{%T}"', 'set format y "10^{%T}"', &
             'set xrange [0.8:1.2e6]', 'set yrange [1e-17:10]', 'set xlabel "number of steps to t = 16"', &
             'set ylabel "error of attitude, median of 9 bodies  [rad]"', &
             'set title "Cutting the same time into more steps"', &
             'set key outside right center vertical spacing 1.1 samplen 2.2 Left reverse', 'plot \', &
             '  1.1e-16*sqrt(x) with lines lc rgb "#777777" lw 1 dt 3 title "2^{-53} N^{1/2}", \', &
-            '  1.1e-16*x with lines lc rgb "#777777" lw 1 dt 2 title "2^{-53} N", \'
+            '  1.1e-16*x with lines lc rgb "#777777" lw 1 dt 2 title "2^{-53} N", \'])
         k = 0
         do i = 1, size(methods)
             if (left_out(methods(i))) cycle
-            write (unit, '(a,i0,a)') '  "growth.dat" index ', k, ' using 1:2'// &
+            write (file%line, '(a,i0,a)') '  "growth.dat" index ', k, ' using 1:2'// &
                 style(methods(i))//', \'
+            call file%put()
             k = k + 1
         end do
-        write (unit, '(a)') '  NaN notitle'
-        close (unit)
+        call file%put('  NaN notitle')
+        call file%finish()
         call draw(options, 'growth')
     end subroutine chart_growth
 

@@ -2,7 +2,8 @@
 module frb_chart_scale
     use frb, only: wp
     use frb_chart_methods, only: method, find_method, style
-    use frb_chart_output, only: settings, open_table, open_script, draw, progress, quantile, say
+    use frb_chart_output, only: chart_file, width, settings, open_table, open_script, draw, progress, &
+        quantile, say
     use frb_chart_timing, only: workload, new_workload, run, threads_there
     implicit none
     private
@@ -24,7 +25,8 @@ contains
         type(workload) :: work
         real(wp), allocatable :: ns(:, :, :)
         integer, allocatable :: steps(:)
-        integer :: counts, repetitions, i, k, n, r, unit
+        type(chart_file) :: file
+        integer :: counts, repetitions, i, k, n, r
         logical :: two
 
         two = threads_there() > 1
@@ -60,22 +62,28 @@ contains
         end do
         call open_table(options, 'scale', &
             'time per body and step against the number of bodies, h = 0.1; a block '// &
-            'per method', 'bodies, ns per body and step: median, quartiles', unit)
+            'per method', 'bodies, ns per body and step: median, quartiles', file)
         do i = 1, curves
-            write (unit, '(a,i0,a)') '# method: '//trim(keys(i))//', ', threads(i), ' thread(s)'
+            write (file%line, '(a,i0,a)') '# method: '//trim(keys(i))//', ', threads(i), ' thread(s)'
+            call file%put()
             do k = 1, counts
                 if (threads(i) > 1 .and. (.not. two .or. k <= 3)) then
-                    if (k == 1) write (unit, '(a)') 'NaN NaN NaN NaN'
+                    if (k == 1) call file%put('NaN NaN NaN NaN')
                     cycle
                 end if
-                write (unit, '(i9,3f10.2)') 10**(k - 1), quantile(ns(:, i, k), 0.5_wp), quantile(ns(:, i, &
+                write (file%line, '(i9,3f10.2)') 10**(k - 1), quantile(ns(:, i, k), 0.5_wp), &
+                    quantile(ns(:, i, &
                     k), 0.25_wp), quantile(ns(:, i, k), 0.75_wp)
+                call file%put()
             end do
-            write (unit, '(/)')
+            call file%end_block()
         end do
-        if (two) write (unit, '(a,f6.3)') '# one thread / two threads at the largest number: ', &
-            quantile(ns(:, 2, counts)/ns(:, 3, counts), 0.5_wp)
-        close (unit)
+        if (two) then
+            write (file%line, '(a,f6.3)') '# one thread / two threads at the largest number: ', &
+                quantile(ns(:, 2, counts)/ns(:, 3, counts), 0.5_wp)
+            call file%put()
+        end if
+        call file%finish()
         call draw_scale()
 
     contains
@@ -91,12 +99,13 @@ contains
             type(method) :: with
             character(:), allocatable :: label
 
-            call open_script(options, 'scale', 900, 520, unit)
-            write (unit, '(a)') 'set logscale xy', 'set format x "10^{%T}"', 'set xrange [0.7:1.5e7]', &
+            call open_script(options, 'scale', 900, 520, file)
+            call file%put_lines([character(width) :: &
+                'set logscale xy', 'set format x "10^{%T}"', 'set xrange [0.7:1.5e7]', &
                 'set yrange [3:1000]', &
                 'set xlabel "number of bodies"', 'set ylabel "time per body and step  [ns]"', &
                 'set title "Many bodies, h = 0.1"', &
-                'set key outside right center vertical samplen 2.2 Left reverse', 'plot \'
+                'set key outside right center vertical samplen 2.2 Left reverse', 'plot \'])
             do i = 1, curves
                 if (threads(i) > 1 .and. .not. two) cycle
                 with = find_method(trim(keys(i)))
@@ -106,11 +115,13 @@ contains
                     with%symbol = 4
                     with%dash = 3
                 end if
-                write (unit, '(a,i0,a)') '  "scale.dat" index ', i - 1, ' using 1:2'//style(with, label)// &
+                write (file%line, '(a,i0,a)') '  "scale.dat" index ', i - 1, ' using 1:2'//style(with, &
+                    label)// &
                     ', \'
+                call file%put()
             end do
-            write (unit, '(a)') '  NaN notitle'
-            close (unit)
+            call file%put('  NaN notitle')
+            call file%finish()
             call draw(options, 'scale')
         end subroutine draw_scale
 

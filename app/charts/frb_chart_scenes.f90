@@ -4,7 +4,7 @@ module frb_chart_scenes
     use frb, only: wp
     use frb_chart_methods, only: method, catalogue, family_batch, family_momentum, family_dp, &
         family_dmv, family_flow
-    use frb_chart_output, only: settings, open_table, quantile, say
+    use frb_chart_output, only: chart_file, settings, open_table, quantile, say
     use frb_chart_timing, only: workload, new_workload, time_in_turn
     use frb_chart_truth, only: free_case, new_case, errors_of
     implicit none
@@ -40,7 +40,8 @@ contains
         type(attempt), allocatable :: attempts(:)
         real(wp), allocatable :: ns(:, :)
         integer, allocatable :: last(:)
-        integer :: s, n, unit
+        type(chart_file) :: file
+        integer :: s, n
 
         allocate (scenes, source=all_scenes())
         allocate (works(size(scenes)*size(catalogue())))
@@ -58,13 +59,13 @@ contains
             'time each method needs for a scene, in as few steps as the bound on '// &
             'the error allows; fastest first', &
             'scene, method, steps, time per body [ns]: median, quartiles; '// &
-            'error (attitude [rad], or of the momentum over its norm); bound', unit)
+            'error (attitude [rad], or of the momentum over its norm); bound', file)
         do s = 1, size(scenes)
             associate (from => last(s - 1) + 1, to => last(s))
-                call write_rows(unit, scenes(s), attempts(from:to), ns(from:to, :))
+                call write_rows(file, scenes(s), attempts(from:to), ns(from:to, :))
             end associate
         end do
-        close (unit)
+        call file%finish()
     end subroutine chart_scenes
 
     pure function all_scenes() result(scenes)
@@ -115,8 +116,8 @@ contains
     end subroutine enter
 
     !> The rows of a scene, the fastest first.
-    subroutine write_rows(unit, what, attempts, ns)
-        integer, intent(in) :: unit
+    subroutine write_rows(file, what, attempts, ns)
+        type(chart_file), intent(inout) :: file
         type(scene), intent(in) :: what
         type(attempt), intent(in) :: attempts(:)
         real(wp), intent(in) :: ns(:, :)
@@ -135,7 +136,7 @@ contains
             done(place) = .true.
             write (line, '(a20,a14,i8,3es12.4,2es10.2)') what%name, attempts(place)%key, &
                 attempts(place)%steps, times(:, place), attempts(place)%error, what%bound
-            write (unit, '(a)') trim(line)
+            call file%put(trim(line))
             if (row == 1) call say('  '//trim(line(:54)))
         end do
     end subroutine write_rows

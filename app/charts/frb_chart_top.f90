@@ -4,7 +4,8 @@ module frb_chart_top
     use frb, only: wp, rigid_body, splitting_scheme, heavy_top, body_drift, body_observer, integrate, &
         status_ok
     use frb_chart_methods, only: method, find_method, known, escaped, advance_once, family_dmv
-    use frb_chart_output, only: settings, open_table, open_script, draw, progress, either, quantile
+    use frb_chart_output, only: chart_file, width, settings, open_table, open_script, draw, progress, &
+        either, quantile
     use frb_chart_timing, only: clock
     use frb_dmv, only: dmv_body, new_dmv_body, dmv_steps
     use frb_top_truth, only: qp, taylor_top
@@ -62,7 +63,8 @@ contains
         integer, parameter :: first_steps(3) = [4, 8, 8]
         type(pairing), allocatable :: pairs(:)
         real(wp), allocatable :: errors(:, :), ns(:, :, :)
-        integer :: s, i, k, unit, most
+        type(chart_file) :: file
+        integer :: s, i, k, most
 
         allocate (pairs, source=pairings())
         most = merge(6, 11, options%quick)
@@ -72,16 +74,18 @@ contains
                 errors, ns)
             call open_table(options, 'heavy-top-'//trim(names(s)), 'error against time spent: '// &
                 trim(titles(s))//'; a block per scheme and drift', &
-                'steps, time [ns]: median, quartiles; error of attitude [rad]', unit)
+                'steps, time [ns]: median, quartiles; error of attitude [rad]', file)
             do i = 1, size(pairs)
-                write (unit, '(a)') '# '//trim(pairs(i)%scheme)//' with '//trim(pairs(i)%drift)
+                call file%put('# '//trim(pairs(i)%scheme)//' with '//trim(pairs(i)%drift))
                 do k = 1, most
-                    write (unit, '(i8,3es13.4,es12.3)') steps_at(options, first_steps(s), k), ns(:, k, i), &
+                    write (file%line, '(i8,3es13.4,es12.3)') steps_at(options, first_steps(s), k), ns(:, &
+                        k, i), &
                         errors(k, i)
+                    call file%put()
                 end do
-                write (unit, '(/)')
+                call file%end_block()
             end do
-            close (unit)
+            call file%finish()
         end do
         call draw_heavy_top(options, pairs, names, titles)
     end subroutine chart_heavy_top
@@ -202,37 +206,42 @@ contains
         type(pairing), intent(in) :: pairs(:)
         character(*), intent(in) :: names(:), titles(:)
         character(160) :: clause
-        integer :: unit, s, i
+        type(chart_file) :: file
+        integer :: s, i
 
-        call open_script(options, 'heavy-top', 1000, 940, unit)
-        write (unit, '(a)') 'set multiplot', 'set logscale xy', 'set format x "10^{%T}"', &
+        call open_script(options, 'heavy-top', 1000, 940, file)
+        call file%put_lines([character(width) :: &
+            'set multiplot', 'set logscale xy', 'set format x "10^{%T}"', &
             'set format y "10^{%T}"', &
             'set yrange [1e-16:30]', 'set xrange [2e2:2e7]', 'set ytics 1e-16,1e2', &
             'set xlabel "time spent  [ns]" offset 0,0.4', 'set ylabel "error of attitude  [rad]"', &
-            'unset key', 'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0'
+            'unset key', 'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0'])
         do s = 1, size(names)
-            write (unit, '(a,f5.3,a,f5.3)') 'set origin ', merge(0.08, 0.58, mod(s, 2) == 1), ',', &
+            write (file%line, '(a,f5.3,a,f5.3)') 'set origin ', merge(0.08, 0.58, mod(s, 2) == 1), ',', &
                 merge(0.56, 0.07, s < 3)
-            write (unit, '(a)') 'set title "'//trim(titles(s))//'" offset 0,-0.6', 'set size 0.40,0.40', &
-                'plot \'
+            call file%put()
+            call file%put('set title "'//trim(titles(s))//'" offset 0,-0.6')
+            call file%put_lines([character(width) :: 'set size 0.40,0.40', 'plot \'])
             do i = 1, size(pairs)
-                write (unit, '(a,i0,a)') '  "heavy-top-'//trim(names(s))//'.dat" index ', i - 1, &
+                write (file%line, '(a,i0,a)') '  "heavy-top-'//trim(names(s))//'.dat" index ', i - 1, &
                     ' using 2:5'//curve(pairs(i), 'notitle')//either(i == size(pairs), '', ', \')
+                call file%put()
             end do
         end do
-        write (unit, '(a)') 'set origin 0.53,0.05', 'set size 0.47,0.45', 'unset border', 'unset tics', &
+        call file%put_lines([character(width) :: &
+            'set origin 0.53,0.05', 'set size 0.47,0.45', 'unset border', 'unset tics', &
             'unset xlabel', &
             'unset ylabel', 'unset title', 'unset grid', 'unset logscale', 'set xrange [0:1]', &
             'set yrange [0:1]', &
-            'set key center center maxrows 14 samplen 2.2 spacing 1.1 Left reverse', 'plot \'
+            'set key center center maxrows 14 samplen 2.2 spacing 1.1 Left reverse', 'plot \'])
         do i = 1, size(pairs)
             clause = trim(pairs(i)%scheme)//', '//either(pairs(i)%drift == 'flow', 'free flow', &
                 escaped(pairs(i)%drift))
-            write (unit, '(a)') '  NaN'//curve(pairs(i), 'title "'//trim(clause)//'"')// &
-                either(i == size(pairs), '', ', \')
+            call file%put('  NaN'//curve(pairs(i), 'title "'//trim(clause)//'"')// &
+                either(i == size(pairs), '', ', \'))
         end do
-        write (unit, '(a)') 'unset multiplot'
-        close (unit)
+        call file%put('unset multiplot')
+        call file%finish()
         call draw(options, 'heavy-top')
     end subroutine draw_heavy_top
 
@@ -252,26 +261,27 @@ contains
     subroutine chart_torus(options)
         type(settings), intent(in) :: options
         type(raster) :: whole, detail
-        integer :: unit
+        type(chart_file) :: file
 
         call run_torus([-0.46_wp, -0.46_wp], [0.46_wp, 0.46_wp], 400, whole)
         call run_torus([0.3972_wp, -0.06_wp], [0.4002_wp, 0.06_wp], 240, detail)
         call open_table(options, 'torus', &
             'where the momentum of the paper''s heavy top is, h = 0.5, t up to 5e4; '// &
-            'blocks: the whole, a close-up', 'm1, m2, number of steps in the pixel (NaN: none)', unit)
+            'blocks: the whole, a close-up', 'm1, m2, number of steps in the pixel (NaN: none)', file)
         call write_raster(whole)
         call write_raster(detail)
-        close (unit)
-        call open_script(options, 'torus', 1000, 520, unit)
-        write (unit, '(a)') 'set multiplot layout 1,2', 'set size ratio -1', 'unset key', 'unset colorbox', &
+        call file%finish()
+        call open_script(options, 'torus', 1000, 520, file)
+        call file%put_lines([character(width) :: &
+            'set multiplot layout 1,2', 'set size ratio -1', 'unset key', 'unset colorbox', &
             'set xlabel "m_1"', 'set ylabel "m_2"', 'set logscale cb', 'set xrange [-0.46:0.46]', &
             'set yrange [-0.46:0.46]', 'set palette defined (0 "#9ecae1", 1 "#0072B2", 2 "#002b4d")', &
             'set title "Heavy top, 100 000 steps of 0.5"', &
             'plot "torus.dat" index 0 using 1:2:3 with image', &
             'set title "Close-up"', 'set xrange [0.3972:0.4002]', 'set yrange [-0.06:0.06]', &
             'set xtics 0.001', 'set ytics 0.02', 'set size noratio', &
-            'plot "torus.dat" index 1 using 1:2:3 with image', 'unset multiplot'
-        close (unit)
+            'plot "torus.dat" index 1 using 1:2:3 with image', 'unset multiplot'])
+        call file%finish()
         call draw(options, 'torus')
 
     contains
@@ -284,10 +294,12 @@ contains
             pixel = (from%high - from%low)/shape(from%hits)
             do j = 1, size(from%hits, 2)
                 do i = 1, size(from%hits, 1)
-                    write (unit, '(2f10.5,1x,a)') from%low + ([i, j] - 0.5_wp)*pixel, text_of(from%hits(i, j))
+                    write (file%line, '(2f10.5,1x,a)') from%low + ([i, j] - 0.5_wp)*pixel, &
+                        text_of(from%hits(i, j))
+                    call file%put()
                 end do
             end do
-            write (unit, '(/)')
+            call file%end_block()
         end subroutine write_raster
 
         function text_of(hits) result(text)

@@ -4,7 +4,7 @@ module frb_chart_torque
     use frb, only: wp, rigid_body, body_drift, body_observer, drift_by_name, free_flow, group_scene, &
         heavy_top, integrate, quat_conjugate, quat_rotate, scheme_names, splitting_plan, splitting_scheme, &
         status_ok, total_energy
-    use frb_chart_output, only: settings, open_table, quantile, say, progress
+    use frb_chart_output, only: chart_file, settings, open_table, quantile, say, progress
     use frb_chart_timing, only: clock
     use frb_dmv, only: dmv_body, new_dmv_body, dmv_steps
     use, intrinsic :: iso_fortran_env, only: int64
@@ -51,20 +51,20 @@ contains
 
     subroutine chart_torque(options)
         type(settings), intent(in) :: options
-        integer :: unit
+        type(chart_file) :: file
 
         call open_table(options, 'torque-cost', 'the splitting loop: the paper''s heavy top, srkn14, '// &
-            'h = 0.5, and dipoles', 'what, median, quartiles', unit)
-        call cost_of_a_step(options, unit)
-        call long_run(options, unit)
-        call time_to_ten_digits(options, unit)
-        call cost_of_dipoles(options, unit)
-        close (unit)
+            'h = 0.5, and dipoles', 'what, median, quartiles', file)
+        call cost_of_a_step(options, file)
+        call long_run(options, file)
+        call time_to_ten_digits(options, file)
+        call cost_of_dipoles(options, file)
+        call file%finish()
         call open_table(options, 'torque-reversal', '10 000 steps there and back: distance from the '// &
             'start; growth: of a small change of the start by the turning point, as roundings grow too', &
-            'top, scheme, h, plain, compensated, growth', unit)
-        call reversal(options, unit)
-        close (unit)
+            'top, scheme, h, plain, compensated, growth', file)
+        call reversal(options, file)
+        call file%finish()
     end subroutine chart_torque
 
     pure function top_number(number) result(item)
@@ -88,9 +88,9 @@ contains
 
     !> A step of srkn14 against its 14 drifts and 14 kicks done by hand, all drifts before all kicks and one
     !> after the other, and with other drifts.
-    subroutine cost_of_a_step(options, unit)
+    subroutine cost_of_a_step(options, file)
         type(settings), intent(in) :: options
-        integer, intent(in) :: unit
+        type(chart_file), intent(inout) :: file
         real(wp), parameter :: h = 0.5_wp
         character(9), parameter :: names(4) = ['free_flow', 'free_flow', 'frb_step ', 'quat_step']
         type(top_at_start) :: item
@@ -153,21 +153,21 @@ contains
             call progress(options, 'torque-cost', r, repetitions)
         end do
         ns = ns*1.0e9_wp/steps
-        call row(unit, '15 drifts [ns]', ns(:, 1))
-        call row(unit, '14 kicks [ns]', ns(:, 2))
-        call row(unit, 'a step [ns]', ns(:, 3))
-        call row(unit, 'a step / (15 drifts + 14 kicks)', ns(:, 3)/(ns(:, 1) + ns(:, 2)))
-        call row(unit, 'a step / the same loop of one''s own', ns(:, 3)/ns(:, 7))
-        call row(unit, 'a compensated step / a step', ns(:, 4)/ns(:, 3))
+        call row(file, '15 drifts [ns]', ns(:, 1))
+        call row(file, '14 kicks [ns]', ns(:, 2))
+        call row(file, 'a step [ns]', ns(:, 3))
+        call row(file, 'a step / (15 drifts + 14 kicks)', ns(:, 3)/(ns(:, 1) + ns(:, 2)))
+        call row(file, 'a step / the same loop of one''s own', ns(:, 3)/ns(:, 7))
+        call row(file, 'a compensated step / a step', ns(:, 4)/ns(:, 3))
         do i = 3, 4
-            call row(unit, 'a step with '//trim(names(i))//' / a step', ns(:, 2 + i)/ns(:, 3))
+            call row(file, 'a step with '//trim(names(i))//' / a step', ns(:, 2 + i)/ns(:, 3))
         end do
     end subroutine cost_of_a_step
 
     !> T = 5e4 in 1e5 steps: time, energy, and the change of its line of best fit over the last nine tenths.
-    subroutine long_run(options, unit)
+    subroutine long_run(options, file)
         type(settings), intent(in) :: options
-        integer, intent(in) :: unit
+        type(chart_file), intent(inout) :: file
         character(12), parameter :: names(2) = [character(12) :: 'plain', 'compensated']
         type(energy_keeper) :: keeper
         type(splitting_scheme) :: scheme
@@ -186,10 +186,10 @@ contains
             call integrate(keeper%item%body, scheme, keeper%item%top, 0.5_wp, 100000, m, q, keeper, &
                            every=100, compensated=i == 2)
             seconds = clock(.false.) - start
-            call row(unit, trim(names(i))//' run to T = 5e4 [s]', [seconds])
-            call row(unit, trim(names(i))//' run: largest error of the energy', &
+            call row(file, trim(names(i))//' run to T = 5e4 [s]', [seconds])
+            call row(file, trim(names(i))//' run: largest error of the energy', &
                      [maxval(abs(keeper%energy - keeper%energy(0)))])
-            call row(unit, trim(names(i))//' run: fitted change over the last nine tenths', &
+            call row(file, trim(names(i))//' run: fitted change over the last nine tenths', &
                      [900*sum(late*keeper%energy(101:1000))/sum(late**2)])
         end do
         if (options%quick) return
@@ -198,22 +198,22 @@ contains
         q_other = start_q
         call integrate(keeper%item%body, scheme, keeper%item%top, 0.5_wp, 100000, m_other, q_other, &
                        drift=drift)
-        call row(unit, 'frb_step against the free flow, distance at T = 5e4', &
+        call row(file, 'frb_step against the free flow, distance at T = 5e4', &
                  [distance(m, q, m_other, q_other)])
         m_other = keeper%item%m0 + [1.0e-9_wp, 0.0_wp, 0.0_wp]
         q_other = start_q
         call integrate(keeper%item%body, scheme, keeper%item%top, 0.5_wp, 100000, m_other, q_other, &
                        compensated=.true.)
-        call row(unit, 'growth of a small change of the start by T = 5e4', &
+        call row(file, 'growth of a small change of the start by T = 5e4', &
                  [distance(m, q, m_other, q_other)*1.0e9_wp])
     end subroutine long_run
 
     !> The paper's top to t = 100 with an error of 1e-10, as few steps as that takes (48, 72,
     !> 96, 144, ...): Strang as kick-drift-kick with Moser-Veselov of order 10 against schemes of higher order
     !> with the free flow.
-    subroutine time_to_ten_digits(options, unit)
+    subroutine time_to_ten_digits(options, file)
         type(settings), intent(in) :: options
-        integer, intent(in) :: unit
+        type(chart_file), intent(inout) :: file
         real(wp), parameter :: t = 100.0_wp, bound = 1.0e-10_wp
         character(8), parameter :: names(2) = [character(8) :: 'srkn14', 'aba864']
         type(top_at_start) :: item
@@ -254,7 +254,7 @@ contains
             end do
         end do
         do i = 2, 3
-            call row(unit, 'time to 1e-10: Strang with DMV10 / '//trim(names(i - 1))//' with the free flow', &
+            call row(file, 'time to 1e-10: Strang with DMV10 / '//trim(names(i - 1))//' with the free flow', &
                      seconds(:, 1)/seconds(:, i))
         end do
 
@@ -289,9 +289,9 @@ contains
     end subroutine advance_by_dmv
 
     !> Drift and kick of n = 1000 dipoles, and a step of srkn14.
-    subroutine cost_of_dipoles(options, unit)
+    subroutine cost_of_dipoles(options, file)
         type(settings), intent(in) :: options
-        integer, intent(in) :: unit
+        type(chart_file), intent(inout) :: file
         integer, parameter :: n = 1000, drifts = 100
         real(wp), parameter :: h = 0.1_wp
         type(lattice) :: scene
@@ -324,17 +324,17 @@ contains
             ns(r, 3) = clock(.false.) - start
         end do
         ns = ns*1.0e3_wp
-        call row(unit, 'drift of 1000 dipoles [ms]', ns(:, 1))
-        call row(unit, 'kick of 1000 dipoles [ms]', ns(:, 2))
-        call row(unit, 'drift / kick of 1000 dipoles', ns(:, 1)/ns(:, 2))
-        call row(unit, 'a step of srkn14 / (15 drifts + 14 kicks) of 1000 dipoles', &
+        call row(file, 'drift of 1000 dipoles [ms]', ns(:, 1))
+        call row(file, 'kick of 1000 dipoles [ms]', ns(:, 2))
+        call row(file, 'drift / kick of 1000 dipoles', ns(:, 1)/ns(:, 2))
+        call row(file, 'a step of srkn14 / (15 drifts + 14 kicks) of 1000 dipoles', &
                  ns(:, 3)/(15*ns(:, 1) + 14*ns(:, 2)))
     end subroutine cost_of_dipoles
 
     !> There and back with every scheme.
-    subroutine reversal(options, unit)
+    subroutine reversal(options, file)
         type(settings), intent(in) :: options
-        integer, intent(in) :: unit
+        type(chart_file), intent(inout) :: file
         integer, parameter :: steps = 10000
         real(wp), parameter :: sizes(4) = [0.001_wp, 0.01_wp, 0.1_wp, 0.5_wp]
         real(wp), parameter :: small = 1.0e-9_wp
@@ -363,7 +363,9 @@ contains
                     q = start_q
                     call integrate(item%body, scheme, item%top, sizes(j), steps, m, q, compensated=.true.)
                     growth = distance(m, q, m_end, q_end)/small
-                    write (unit, '(2a12,f8.3,3es11.2)') item%name, scheme_names(k), sizes(j), back, growth
+                    write (file%line, '(2a12,f8.3,3es11.2)') item%name, scheme_names(k), sizes(j), back, &
+                        growth
+                    call file%put()
                 end do
             end do
             call progress(options, 'torque-reversal', number, 3)
@@ -379,16 +381,17 @@ contains
     end function distance
 
     !> A row of torque-cost: median and quartiles; on the screen the median.
-    subroutine row(unit, what, values)
-        integer, intent(in) :: unit
+    subroutine row(file, what, values)
+        type(chart_file), intent(inout) :: file
         character(*), intent(in) :: what
         real(wp), intent(in) :: values(:)
         character(120) :: line
 
         write (line, '(2x,a70,es11.3)') what, quantile(values, 0.5_wp)
         call say(trim(line))
-        write (unit, '(a70,3es11.3)') what, quantile(values, 0.5_wp), quantile(values, 0.25_wp), &
+        write (file%line, '(a70,3es11.3)') what, quantile(values, 0.5_wp), quantile(values, 0.25_wp), &
             quantile(values, 0.75_wp)
+        call file%put()
     end subroutine row
 
     subroutine keep_energy(self, step, t, m, q, stop)

@@ -2,7 +2,8 @@
 module frb_chart_triangle
     use frb, only: wp
     use frb_chart_methods, only: method, find_method, known, escaped
-    use frb_chart_output, only: settings, open_table, open_script, draw, progress, say, either, &
+    use frb_chart_output, only: chart_file, width, settings, open_table, open_script, draw, progress, &
+        say, either, &
         random_direction
     use frb_chart_truth, only: free_case, new_case, errors_of
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
@@ -34,7 +35,8 @@ contains
         real(wp) :: x, y, error_m, error_q
         type(free_case) :: item
         integer(int64) :: seed
-        integer :: nx, ny, momenta, i, j, k, c, unit
+        type(chart_file) :: file
+        integer :: nx, ny, momenta, i, j, k, c
         character(160) :: line
 
         allocate (methods, source=pack([(find_method_or_none(wanted(i)), i=1, 3)], [(known(wanted(i)), i=1, &
@@ -70,19 +72,21 @@ contains
         end do
         call open_table(options, name, &
             'log10 of the error of one step h = 1, |m| = 1, over the shapes of a body, '// &
-            title, 'I1/I3, I2/I3, then mean and largest log10 of the error for '//names_of(methods), unit)
+            title, 'I1/I3, I2/I3, then mean and largest log10 of the error for '//names_of(methods), file)
         do j = 1, ny
             do i = 1, nx
-                write (unit, '(2f9.5,8f9.3)') (i - 0.5_wp)/nx, 0.5_wp + 0.5_wp*(j - 0.5_wp)/ny, maps(:, i, j)
+                write (file%line, '(2f9.5,8f9.3)') (i - 0.5_wp)/nx, 0.5_wp + 0.5_wp*(j - 0.5_wp)/ny, &
+                    maps(:, i, j)
+                call file%put()
             end do
         end do
         do k = 1, size(methods)
             write (line, '(2(a,f7.2))') '# '//methods(k)%key//' mean over the triangle ', &
                 mean_of(maps(2*k - 1, :, :)), ', largest ', largest_of(maps(2*k, :, :))
-            write (unit, '(a)') trim(line)
+            call file%put(trim(line))
             call say('  '//trim(line(3:)))
         end do
-        close (unit)
+        call file%finish()
         call draw_triangle(options, methods, name, title)
     end subroutine one_triangle
 
@@ -123,30 +127,35 @@ contains
         type(method), intent(in) :: methods(:)
         character(*), intent(in) :: name, title
         character(*), parameter :: which(2) = [character(7) :: 'mean', 'largest']
-        integer :: unit, k, row
+        type(chart_file) :: file
+        integer :: k, row
         real(wp) :: left
 
-        call open_script(options, name, 1000, 560, unit)
-        write (unit, '(a)') 'set multiplot title "log_{10} of the error of one step h = 1, '//title//'"', &
+        call open_script(options, name, 1000, 560, file)
+        call file%put('set multiplot title "log_{10} of the error of one step h = 1, '//title//'"')
+        call file%put_lines([character(width) :: &
             'set palette defined (0 "#fde725", 1 "#5ec962", 2 "#21918c", 3 "#3b528b", 4 "#440154")', &
             'set cbrange [-16.5:-13.5]', 'set xrange [0:1]', 'set yrange [0.5:1]', 'set xtics 0.25', &
-            'set ytics 0.1', &
-            'unset key', 'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0', 'set cbtics 0.5', &
-            'set colorbox user origin 0.93,0.13 size 0.018,0.72'
+            'set ytics 0.1', 'unset key', 'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0', &
+            'set cbtics 0.5', 'set colorbox user origin 0.93,0.13 size 0.018,0.72'])
         do row = 1, 2
             do k = 1, size(methods)
                 left = 0.075_wp + 0.285_wp*(k - 1)
-                write (unit, '(a,f6.4,a,f6.4)') 'set origin ', left, ',', merge(0.55_wp, 0.11_wp, row == 1)
-                write (unit, '(a)') 'set size 0.25,0.32', &
-                    'set title "'//escaped(methods(k)%label)//', '//trim(which(row))//'" offset 0,-0.6', &
-                    either(k == 1, 'set ylabel "I_2/I_3" offset 1,0', 'unset ylabel'), &
-                    either(row == 2, 'set xlabel "I_1/I_3" offset 0,0.5', 'unset xlabel')
-                write (unit, '(a,i0,a)') 'plot "'//name//'.dat" using 1:2:', 2*k + row, ' with image'
-                write (unit, '(a)') 'unset colorbox'
+                write (file%line, '(a,f6.4,a,f6.4)') 'set origin ', left, ',', merge(0.55_wp, 0.11_wp, &
+                    row == 1)
+                call file%put()
+                call file%put('set size 0.25,0.32')
+                call file%put('set title "'//escaped(methods(k)%label)//', '//trim(which(row))// &
+                    '" offset 0,-0.6')
+                call file%put(either(k == 1, 'set ylabel "I_2/I_3" offset 1,0', 'unset ylabel'))
+                call file%put(either(row == 2, 'set xlabel "I_1/I_3" offset 0,0.5', 'unset xlabel'))
+                write (file%line, '(a,i0,a)') 'plot "'//name//'.dat" using 1:2:', 2*k + row, ' with image'
+                call file%put()
+                call file%put('unset colorbox')
             end do
         end do
-        write (unit, '(a)') 'unset multiplot'
-        close (unit)
+        call file%put('unset multiplot')
+        call file%finish()
         call draw(options, name)
     end subroutine draw_triangle
 

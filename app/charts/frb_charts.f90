@@ -5,7 +5,7 @@ program frb_charts
     use frb_chart_cost, only: chart_cost, chart_speed
     use frb_chart_failure, only: chart_failure
     use frb_chart_orbits, only: chart_orbits, chart_racket
-    use frb_chart_output, only: settings, say
+    use frb_chart_output, only: settings, give_up, say
     use frb_chart_precision, only: chart_work_precision, chart_growth
     use frb_chart_scale, only: chart_scale
     use frb_chart_scenes, only: chart_scenes
@@ -14,9 +14,7 @@ program frb_charts
     use frb_chart_triangle, only: chart_triangle
     use frb_chart_water, only: chart_water
     use frb_kinds, only: has_quad
-    use frb_system, only: c_exit
-    use, intrinsic :: iso_c_binding, only: c_int
-    use, intrinsic :: iso_fortran_env, only: error_unit
+    use frb_system, only: full_files_are_errors
     implicit none
 
     character(*), parameter :: names(*) = [character(16) :: 'speed', 'scenes', 'cost', 'work-precision', &
@@ -26,6 +24,7 @@ program frb_charts
     logical :: wanted(size(names))
     integer :: i, which, code
 
+    call full_files_are_errors()
     wanted = .false.
     options%folder = 'charts'
     i = 1
@@ -37,7 +36,7 @@ program frb_charts
         case ('--out')
             i = i + 1
             options%folder = argument_at(i)
-            if (len(options%folder) == 0) call refuse('--out needs a folder')
+            if (len(options%folder) == 0) call give_up('--out needs a folder')
         case ('--help', '-h')
             call list_charts()
             stop
@@ -45,7 +44,7 @@ program frb_charts
             where (names /= 'agreement') wanted = .true.
         case default
             which = findloc(names == argument, .true., dim=1)
-            if (which == 0) call refuse('no such chart: '//argument)
+            if (which == 0) call give_up('no such chart: '//argument)
             wanted(which) = .true.
         end select
         i = i + 1
@@ -54,10 +53,10 @@ program frb_charts
         call list_charts()
         stop
     end if
-    if (.not. has_quad) call refuse('the truth needs a compiler with quadruple precision')
-    if (index(options%folder, "'") > 0) call refuse('a quote in the name of the folder')
+    if (.not. has_quad) call give_up('the truth needs a compiler with quadruple precision')
+    if (index(options%folder, "'") > 0) call give_up('a quote in the name of the folder')
     call execute_command_line('mkdir -p '''//options%folder//'''', exitstat=code, cmdstat=i)
-    if (code /= 0) call refuse('cannot make the folder '//options%folder)
+    if (code /= 0) call give_up('cannot make the folder '//options%folder)
     call execute_command_line('test -t 2', exitstat=code, cmdstat=i)
     options%terminal = code == 0
     do i = 1, size(names)
@@ -129,13 +128,5 @@ contains
         call say('--quick: a minute for all of them; --out DIR: where the tables, scripts and '// &
             'pictures go (charts)')
     end subroutine list_charts
-
-    subroutine refuse(message)
-        character(*), intent(in) :: message
-
-        write (error_unit, '(a)') 'frb_charts: '//message
-        flush (error_unit)
-        call c_exit(1_c_int)
-    end subroutine refuse
 
 end program frb_charts

@@ -6,9 +6,9 @@ module frb_driver_command
     use frb, only: scheme_names
     use frb_init_files, only: init_values, read_init_file
     use frb_out_files, only: out_file
-    use frb_system, only: c_exit, c_signal
+    use frb_system, only: c_exit, full_files_are_errors
     use frb_release, only: version
-    use, intrinsic :: iso_c_binding, only: c_int, c_intptr_t
+    use, intrinsic :: iso_c_binding, only: c_int
     use, intrinsic :: iso_fortran_env, only: error_unit
     implicit none
     private
@@ -44,13 +44,9 @@ contains
         type(run_command), intent(in) :: command
         type(init_values), intent(out) :: values
         type(out_file), intent(out) :: out
-        ! A file that grows beyond the limit of the shell is an error of writing, not the end of the program.
-        integer(c_int), parameter :: file_too_large = 25
-        integer(c_intptr_t), parameter :: ignore = 1
         character(:), allocatable :: error
-        integer(c_intptr_t) :: before
 
-        before = c_signal(file_too_large, ignore)
+        call full_files_are_errors()
         call read_init_file(command%init_path, example, values, error, command%out_path)
         if (allocated(error)) call fail(error)
         call out%open_for_writing(command%out_path, error)

@@ -5,7 +5,8 @@ module frb_system
     private
 
     public :: c_fopen, c_fdopen, c_fwrite, c_ftell, c_fflush, c_fclose
-    public :: c_rename, c_remove, c_readlink, c_realpath, c_getpid, c_geteuid, c_isatty, c_exit, c_signal
+    public :: full_files_are_errors
+    public :: c_rename, c_remove, c_readlink, c_realpath, c_getpid, c_geteuid, c_isatty, c_exit
 
     interface
         !> C: opens a file; a null pointer if that cannot be done.
@@ -132,5 +133,17 @@ module frb_system
             integer(c_intptr_t) :: before
         end function c_signal
     end interface
+
+contains
+
+    !> From here on a file that grows beyond the limit of the shell is an error of writing, as a full disk is,
+    !> and not the end of the program.
+    subroutine full_files_are_errors()
+        integer(c_int), parameter :: file_too_large = 25
+        integer(c_intptr_t), parameter :: ignored = 1
+        integer(c_intptr_t) :: before
+
+        before = c_signal(file_too_large, ignored)
+    end subroutine full_files_are_errors
 
 end module frb_system
