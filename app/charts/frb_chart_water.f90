@@ -2,7 +2,7 @@
 !> cost, with the exact rotation for the drift and with the turns of NO_SQUISH.
 module frb_chart_water
     use frb, only: wp, splitting_plan, splitting_scheme
-    use frb_chart_output, only: settings, open_table, open_script, draw, either, progress, say
+    use frb_chart_output, only: chart_file, settings, open_table, open_script, draw, either, progress, say
     use frb_water_model, only: cluster, load, run_water
     implicit none
     private
@@ -26,7 +26,8 @@ contains
         type(cluster) :: start
         real(wp) :: time, rms
         character(60) :: line
-        integer :: unit, i, j, drift, done
+        type(chart_file) :: file
+        integer :: i, j, drift, done
         logical :: squish, there
 
         inquire (file=molecules, exist=there)
@@ -38,20 +39,20 @@ contains
         call load(molecules, start)
         call open_table(options, 'water', '64 rigid water molecules: energy against the cost of a scheme', &
             'step [fs], forces per fs, rms of the total energy about its line [kcal/mol]; a block for '// &
-            'each scheme and drift', unit)
+            'each scheme and drift', file)
         done = 0
         do i = 1, size(names)
             scheme = splitting_scheme(names(i))
             if (names(i) == 'verlet') scheme = splitting_scheme([1.0_wp], [0.5_wp, 0.5_wp], 'verlet')
             do drift = 1, 2
                 squish = drift == 2
-                write (unit, '(a)') '# '//trim(names(i))//', '//either(squish, 'NO_SQUISH', 'free flow')
+                call file%put('# '//trim(names(i))//', '//either(squish, 'NO_SQUISH', 'free flow'))
                 do j = 1, size(steps, 1)
                     associate (h => steps(j, i))
                         if (h > 0.0_wp) then
                             call run_water(splitting_plan(scheme, h), h, time, spacing, squish, start, rms)
                             write (line, '(f6.1,f9.3,es12.3)') h, scheme%stages()/h, rms
-                            write (unit, '(a)') trim(line)
+                            call file%put(trim(line))
                             if (h >= 4.0_wp .and. h <= 4.0_wp) call say('  '//names(i)// &
                                 either(squish, ' NO_SQUISH  ', ' free flow  ')//trim(line))
                         end if
@@ -59,32 +60,35 @@ contains
                     done = done + 1
                     call progress(options, 'water', done, 2*size(steps))
                 end do
-                write (unit, '(/)')
+                call file%end_block()
             end do
         end do
-        close (unit)
+        call file%finish()
         call draw_water(options)
     end subroutine chart_water
 
     subroutine draw_water(options)
         type(settings), intent(in) :: options
-        integer :: unit, i
+        type(chart_file) :: file
+        integer :: i
 
-        call open_script(options, 'water', 900, 620, unit)
-        write (unit, '(a)') 'set title "64 rigid water molecules: exact rotation against NO_SQUISH (dashed)"'
-        write (unit, '(a)') 'set xlabel "forces per fs"'
-        write (unit, '(a)') 'set ylabel "rms of the energy [kcal/mol]"'
-        write (unit, '(a)') 'set logscale xy'
-        write (unit, '(a)') 'set format y "10^{%T}"'
-        write (unit, '(a)') 'set key outside right'
-        write (unit, '(a)') 'plot \'
+        call open_script(options, 'water', 900, 620, file)
+        call file%put('set title "64 rigid water molecules: exact rotation against NO_SQUISH (dashed)"')
+        call file%put('set xlabel "forces per fs"')
+        call file%put('set ylabel "rms of the energy [kcal/mol]"')
+        call file%put('set logscale xy')
+        call file%put('set format y "10^{%T}"')
+        call file%put('set key outside right')
+        call file%put('plot \')
         do i = 1, size(names)
-            write (unit, '(a,i0,a,i0,a)') '  "water.dat" index ', 2*i - 2, ' using 2:3 with lp lt ', i, &
+            write (file%line, '(a,i0,a,i0,a)') '  "water.dat" index ', 2*i - 2, ' using 2:3 with lp lt ', i, &
                 ' ps 0.8 title "'//trim(names(i))//'", \'
-            write (unit, '(a,i0,a,i0,a)') '  "water.dat" index ', 2*i - 1, ' using 2:3 with lp lt ', i, &
+            call file%put()
+            write (file%line, '(a,i0,a,i0,a)') '  "water.dat" index ', 2*i - 1, ' using 2:3 with lp lt ', i, &
                 ' dt 2 ps 0.8 notitle'//either(i < size(names), ', \', '')
+            call file%put()
         end do
-        close (unit)
+        call file%finish()
         call draw(options, 'water')
     end subroutine draw_water
 
