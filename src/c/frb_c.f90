@@ -22,21 +22,24 @@ module frb_c
     !> Bodies gathered at a time where memory has other strides than the library.
     integer, parameter :: chunk = 64
 
-    !> What pointers of C point to.
+    !> What pointers of C point to: three numbers.
     type, bind(c) :: triple
         real(c_double) :: x(3)
     end type triple
 
+    !> A quaternion.
     type, bind(c) :: quadruple
         real(c_double) :: x(4)
     end type quadruple
 
+    !> A 3 x 3 matrix.
     type, bind(c) :: matrix
         real(c_double) :: x(3, 3)
     end type matrix
 
     !> A motion that was made here bears the seal: memory that C never set does not.
     integer(c_int), parameter :: seal_of_motions = 1713044275_c_int
+    !> The motion and its seal.
     type :: sealed_motion
         integer(c_int) :: seal = seal_of_motions
         type(free_motion) :: motion
@@ -330,6 +333,7 @@ contains
         if (yes .and. core%status == status_ok) yes = core%a(3) > 0.0_c_double
     end function usable
 
+    !> Whether a number can be that of an axis.
     pure function is_axis(i) result(yes)
         integer(c_int), intent(in) :: i
         logical :: yes

@@ -17,6 +17,7 @@ module frb_c_torque
 
     public :: torque_in_c
 
+    !> What a torque in C takes.
     abstract interface
         !> The user's torque in C.
         function torque_in_c(context, q, t, tau) bind(c) result(stat)

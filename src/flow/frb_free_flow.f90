@@ -39,10 +39,10 @@ module frb_free_flow
         private
         type(body_core) :: core
     contains
-        procedure :: status => status_of_body
-        procedure :: moments => moments_of_body
-        procedure :: axes => axes_of_body
-        procedure :: is_linear => body_is_linear
+        procedure :: status => status_of_body    !! `status_ok`, or why it could not be made
+        procedure :: moments => moments_of_body    !! principal moments (3)
+        procedure :: axes => axes_of_body    !! principal axes, as columns (3, 3)
+        procedure :: is_linear => body_is_linear    !! whether one moment is 0
     end type rigid_body
 
     !> Makes a body from its principal moments(3), in any order, or from its inertia tensor(3,3) about the

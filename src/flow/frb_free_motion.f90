@@ -30,12 +30,12 @@ module frb_free_motion
         real(wp), private :: half_angle = 0.0_wp    !! half the turn about the momentum in a period
         real(wp), private :: turns_sign = 1.0_wp    !! -1 when q changes sign besides
     contains
-        procedure, private :: at_time
-        procedure, private :: at_times
-        generic :: at => at_time, at_times
-        procedure :: period
-        procedure :: precession
-        procedure :: precession_period
+        procedure, private :: at_time    !! state at one time
+        procedure, private :: at_times    !! states at n times
+        generic :: at => at_time, at_times    !! m, and q when present, at t or t(n)
+        procedure :: period    !! period of m
+        procedure :: precession    !! turn about the momentum in it [rad]
+        procedure :: precession_period    !! mean time of a turn about the momentum
     end type free_motion
 
     !> Constants of an orbit in scaled units.
@@ -51,6 +51,7 @@ module frb_free_motion
         logical :: first_form = .true.
     end type orbit
 
+    !> Sets up a motion from its state at t = 0: `motion = free_motion(body, m, q)`.
     interface free_motion
         module procedure motion_from_state
     end interface free_motion

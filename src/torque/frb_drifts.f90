@@ -17,14 +17,14 @@ module frb_drifts
     !> The free flow, as `integrate` uses it when no drift is given.
     type, extends(body_drift) :: flow_drift
     contains
-        procedure :: advance => advance_by_flow
+        procedure :: advance => advance_by_flow    !! by `free_flow`
     end type flow_drift
 
     !> The paper's Algorithm 1, `frb_step`.
     type, extends(body_drift) :: matrix_drift
         integer :: points = 0       !! Gauss points; 0: exact
     contains
-        procedure :: advance => advance_by_matrix
+        procedure :: advance => advance_by_matrix    !! by `frb_step`
     end type matrix_drift
 
     !> The paper's Algorithm 2, `quat_step`.
@@ -32,7 +32,7 @@ module frb_drifts
         integer :: points = 0       !! Gauss points; 0: exact
         integer :: frame = 1        !! 1, 2 or 3
     contains
-        procedure :: advance => advance_by_quaternion
+        procedure :: advance => advance_by_quaternion    !! by `quat_step`
     end type quaternion_drift
 
 contains

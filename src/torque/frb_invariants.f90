@@ -48,7 +48,7 @@ module frb_invariants
         real(wp) :: momentum_error = 0.0_wp             !! largest |axis . Q m - momentum|
         real(wp) :: norm_error = 0.0_wp                 !! largest | |q| - 1 |
     contains
-        procedure :: observe => monitor_body
+        procedure :: observe => monitor_body    !! takes the largest errors so far
     end type invariant_monitor
 
 contains

@@ -16,9 +16,9 @@ module frb_scenes
         real(wp) :: force(3) = [0.0_wp, 0.0_wp, 1.0_wp]     !! gradient of V, in space
         real(wp) :: centre(3) = [0.0_wp, 0.0_wp, 1.0_wp]    !! point it acts at, in the body
     contains
-        procedure :: torque => heavy_top_torque
-        procedure :: torque_change => heavy_top_torque_change
-        procedure :: potential => heavy_top_potential
+        procedure :: torque => heavy_top_torque    !! u x centre
+        procedure :: torque_change => heavy_top_torque_change    !! its derivative along a turn
+        procedure :: potential => heavy_top_potential    !! force . Q centre
     end type heavy_top
 
     !> A scene made of plain procedures, for a torque without parameters: plain_scene(torque, potential).
@@ -26,10 +26,11 @@ module frb_scenes
         procedure(plain_torque), pointer, nopass :: torque_of => null()
         procedure(plain_potential), pointer, nopass :: potential_of => null()   !! may stay null
     contains
-        procedure :: torque => plain_scene_torque
-        procedure :: potential => plain_scene_potential
+        procedure :: torque => plain_scene_torque    !! the user's
+        procedure :: potential => plain_scene_potential    !! the user's, or NaN
     end type plain_scene
 
+    !> What the procedures of a `plain_scene` take.
     abstract interface
         !> The torque at attitude q and time t, in the body frame.
         subroutine plain_torque(q, t, tau)

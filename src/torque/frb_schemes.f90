@@ -63,14 +63,15 @@ module frb_schemes
         integer :: displaced = 2                    !! torques by which a modified kick tells the change of
                                                     !! the torque, 1 or 2, when the scene does not
     contains
-        procedure :: drift_coefficients
-        procedure :: kick_coefficients
-        procedure :: modified_coefficients
-        procedure :: has_modified_kicks
-        procedure :: stages
-        procedure :: conditions
+        procedure :: drift_coefficients    !! all of one step, in turn
+        procedure :: kick_coefficients    !! all of one step, in turn
+        procedure :: modified_coefficients    !! those of modified kicks
+        procedure :: has_modified_kicks    !! whether there are any
+        procedure :: stages    !! kicks of one step
+        procedure :: conditions    !! its order, and what it misses
     end type splitting_scheme
 
+    !> A scheme by its name, `splitting_scheme(name)`, or from coefficients of the user's.
     interface splitting_scheme
         module procedure scheme_by_name
         module procedure scheme_from_coefficients

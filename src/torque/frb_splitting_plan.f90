@@ -56,6 +56,7 @@ module frb_splitting_plan
         integer :: on_request = 2               !! how many if it does not
     end type run_basis
 
+    !> The plan of a step: `plan = splitting_plan(scheme, h [, stat])`.
     interface splitting_plan
         module procedure plan_of_step
         module procedure plan_of_step_with_stat

@@ -22,40 +22,41 @@ module frb_torque
     !> where there is one and the energy is to be watched.
     type, abstract :: body_scene
     contains
-        procedure(torque_on_body), deferred :: torque
-        procedure :: torque_change => body_change_unknown
-        procedure :: potential => body_potential_unknown
-        procedure :: agree => body_alone
+        procedure(torque_on_body), deferred :: torque    !! the torque
+        procedure :: torque_change => body_change_unknown    !! its derivative, for modified kicks
+        procedure :: potential => body_potential_unknown    !! the potential, where there is one
+        procedure :: agree => body_alone    !! hook of runs on many processes
     end type body_scene
 
     !> The torques on n bodies that interact: each sees the attitudes of all. Centres are the scene's own
     !> matter: components where they stand still, functions of t where they move.
     type, abstract :: group_scene
     contains
-        procedure(torques_on_group), deferred :: torques
-        procedure :: torques_change => group_change_unknown
-        procedure :: potential => group_potential_unknown
-        procedure :: agree => group_alone
+        procedure(torques_on_group), deferred :: torques    !! the torques
+        procedure :: torques_change => group_change_unknown    !! their derivative, for modified kicks
+        procedure :: potential => group_potential_unknown    !! the potential, where there is one
+        procedure :: agree => group_alone    !! hook of runs on many processes
     end type group_scene
 
     !> Watches a run of one body.
     type, abstract :: body_observer
     contains
-        procedure(observe_body), deferred :: observe
+        procedure(observe_body), deferred :: observe    !! sees the state
     end type body_observer
 
     !> Watches a run of n bodies.
     type, abstract :: group_observer
     contains
-        procedure(observe_group), deferred :: observe
+        procedure(observe_group), deferred :: observe    !! sees the states
     end type group_observer
 
     !> A flow of the free body, or an approximation of it, to take the place of `free_flow`.
     type, abstract :: body_drift
     contains
-        procedure(advance_body), deferred :: advance
+        procedure(advance_body), deferred :: advance    !! moves the body
     end type body_drift
 
+    !> What the procedures of a scene, an observer and a drift take.
     abstract interface
         !> The torque at attitude q and time t.
         subroutine torque_on_body(self, q, t, tau, stat)
