@@ -30,6 +30,7 @@ program check
     use frb_test_splitting, only: test_splitting
     use frb_test_groups, only: test_groups
     use frb_test_frames, only: test_frames
+    use frb_test_open_loop, only: test_open_loop
     use frb_test_legendre, only: test_legendre
     use frb_test_quadrature, only: test_quadrature
     use frb_test_free_flow, only: test_free_flow
@@ -98,6 +99,7 @@ contains
         call suite(task, 'splitting', test_splitting)
         call suite(task, 'groups', test_groups)
         call suite(task, 'frames', test_frames)
+        call suite(task, 'open-loop', test_open_loop)
         call suite(task, 'legendre', test_legendre)
         call suite(task, 'quadrature', test_quadrature)
         call suite(task, 'free-flow', test_free_flow)

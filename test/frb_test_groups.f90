@@ -8,7 +8,8 @@ module frb_test_groups
     use frb_splitting, only: integrate
     use frb_status, only: status_ok, status_bad_attitude, status_bad_count, status_bad_moments, &
         status_bad_momentum, status_bad_option, status_bad_time, status_bad_torque
-    use frb_torque_cases, only: dipoles, distance, failing_drift, group_recorder, many_tops, plain_drift
+    use frb_torque_cases, only: dipoles, distance, failing_drift, group_recorder, many_tops, plain_drift, &
+        start_of_group
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
     implicit none
     private
@@ -31,20 +32,6 @@ contains
         call t%close_suite()
     end subroutine test_groups
 
-    !> n different bodies and their start.
-    subroutine start(body, m, q)
-        type(rigid_body), intent(out) :: body(n)
-        real(wp), intent(out) :: m(3, n), q(4, n)
-        integer :: i
-
-        do i = 1, n
-            body(i) = rigid_body([1.0_wp + 0.1_wp*i, 1.5_wp - 0.1_wp*i, 0.8_wp])
-            m(:, i) = [sin(1.0_wp*i), cos(2.0_wp*i), sin(3.0_wp*i)]
-            q(:, i) = [1.0_wp, cos(5.0_wp*i), sin(7.0_wp*i), cos(11.0_wp*i)]
-            q(:, i) = q(:, i)/sqrt(sum(q(:, i)**2))
-        end do
-    end subroutine start
-
     !> Bodies that do not see each other move as if alone.
     subroutine test_against_one(t)
         type(tally), intent(inout) :: t
@@ -58,7 +45,7 @@ contains
 
         do k = 1, 2
             scheme = splitting_scheme(trim(names(k)))
-            call start(body, m, q)
+            call start_of_group(body, m, q)
             m_one = m
             q_one = q
             m_drift = m
@@ -74,7 +61,7 @@ contains
                            + largest([abs(q - q_one)]), 256*eps)
             call t%at_most('a-drift-of-the-users-moves-each-body', largest([abs(m_drift - m_one)]) &
                            + largest([abs(q_drift - q_one)]), 256*eps)
-            call start(body, m, q)
+            call start_of_group(body, m, q)
             m_one = m
             q_one = q
             m_drift = m
@@ -102,7 +89,7 @@ contains
         integer :: i
 
         scheme = splitting_scheme('srkn14')
-        call start(body, m, q)
+        call start_of_group(body, m, q)
         m_one = m
         q_one = q
         call integrate(body, scheme, scene, 0.01_wp, 2000, m, q, compensated=.true.)
@@ -128,7 +115,7 @@ contains
         integer :: i, k
 
         scene%strength = 0.5_wp
-        call start(body, m_start, q_start)
+        call start_of_group(body, m_start, q_start)
         m_fine = m_start
         q_fine = q_start
         call integrate(body, splitting_scheme('srkn14'), scene, 0.01_wp, 300, m_fine, q_fine)
@@ -196,7 +183,7 @@ contains
         real(wp) :: m(3, n), q(4, n), m_start(3, n), q_start(4, n)
         integer :: stat
 
-        call start(body, m, q)
+        call start_of_group(body, m, q)
         m_start = m
         q_start = q
         scheme = splitting_scheme('srkn14')

@@ -11,8 +11,8 @@ module frb_torque_cases
     implicit none
     private
 
-    public :: top_case, known_top, distance, fitted_change, recorder, group_recorder, pulsed_torque, &
-        spoilt_torque, plain_drift, failing_drift, tilting_drift, dipoles, many_tops
+    public :: top_case, known_top, start_of_group, distance, fitted_change, recorder, group_recorder, &
+        pulsed_torque, spoilt_torque, plain_drift, failing_drift, tilting_drift, dipoles, many_tops
 
     !> A heavy top with its start and its end after the time t, to 25 digits (data/reference/make_tops.py).
     type :: top_case
@@ -127,6 +127,20 @@ contains
                       -0.359037465977168255346088_wp, -0.004666026662444763974661153_wp]
         end select
     end function known_top
+
+    !> Different bodies and their start.
+    subroutine start_of_group(body, m, q)
+        type(rigid_body), intent(out) :: body(:)
+        real(wp), intent(out) :: m(:, :), q(:, :)
+        integer :: i
+
+        do i = 1, size(body)
+            body(i) = rigid_body([1.0_wp + 0.1_wp*i, 1.5_wp - 0.1_wp*i, 0.8_wp])
+            m(:, i) = [sin(1.0_wp*i), cos(2.0_wp*i), sin(3.0_wp*i)]
+            q(:, i) = [1.0_wp, cos(5.0_wp*i), sin(7.0_wp*i), cos(11.0_wp*i)]
+            q(:, i) = q(:, i)/sqrt(sum(q(:, i)**2))
+        end do
+    end subroutine start_of_group
 
     !> Distance of two states, Euclidean; q and -q are the same attitude.
     pure function distance(m, q, m_ref, q_ref) result(d)

@@ -11,7 +11,10 @@ module frb_rotations
     private
 
     public :: cross, norm3, quat_product, quat_conjugate, quat_rotate, quat_to_matrix, matrix_to_quat, &
-        quat_along, is_unit_quat
+        quat_along, is_unit_quat, unit_tolerance
+
+    !> How far from one the norm of a quaternion may be where it must be one.
+    real(wp), parameter :: unit_tolerance = 1.0e-6_wp
 
 contains
 
@@ -61,18 +64,24 @@ contains
     end function quat_conjugate
 
     !> Whether q can stand for an attitude where that must have norm one: finite, | |q| - 1 | at most 1e-6.
-    !> Every routine of the library that needs a unit quaternion asks this and refuses others.
+    !> Every routine of the library that needs a unit quaternion asks this and refuses others: by its `stat`,
+    !> `status_bad_attitude`, or with NaN. What takes any norm says so.
     pure function is_unit_quat(q) result(good)
         real(wp), intent(in) :: q(4)
         logical :: good
-        real(wp), parameter :: tolerance = 1.0e-6_wp
+        real(wp) :: largest, square
 
-        good = all(ieee_is_finite(q))
-        if (good) good = maxval(abs(q)) < 2.0_wp
-        if (good) good = abs(sqrt(sum(q*q)) - 1) <= tolerance
+        good = ieee_is_finite(q(1)) .and. ieee_is_finite(q(2)) .and. ieee_is_finite(q(3)) &
+               .and. ieee_is_finite(q(4))
+        if (.not. good) return
+        largest = max(abs(q(1)), abs(q(2)), abs(q(3)), abs(q(4)))
+        good = largest < 2.0_wp
+        if (.not. good) return
+        square = (q(1)*q(1) + q(2)*q(2)) + (q(3)*q(3) + q(4)*q(4))
+        good = square >= (1 - unit_tolerance)**2 .and. square <= (1 + unit_tolerance)**2
     end function is_unit_quat
 
-    !> The vector E(q) v, from body to space for an attitude q of norm one, (10).
+    !> The vector E(q) v, from body to space for an attitude q of norm one, (10); NaN for another norm.
     pure function quat_rotate(q, v) result(w)
         real(wp), intent(in) :: q(4), v(3)
         real(wp) :: w(3)
@@ -80,9 +89,10 @@ contains
 
         twice_cross = 2*cross(q(2:4), v)
         w = v + q(1)*twice_cross + cross(q(2:4), twice_cross)
+        if (.not. is_unit_quat(q)) w = ieee_value(w, ieee_quiet_nan)
     end function quat_rotate
 
-    !> Rotation matrix E(q) of a quaternion of norm one, (10).
+    !> Rotation matrix E(q) of a quaternion of norm one, (10); NaN for another norm.
     pure function quat_to_matrix(q) result(matrix)
         real(wp), intent(in) :: q(4)
         real(wp) :: matrix(3, 3)
@@ -96,6 +106,7 @@ contains
         matrix(1, 3) = 2*(q(2)*q(4) + q(1)*q(3))
         matrix(2, 3) = 2*(q(3)*q(4) - q(1)*q(2))
         matrix(3, 3) = 1 - 2*(q(2)*q(2) + q(3)*q(3))
+        if (.not. is_unit_quat(q)) matrix = ieee_value(matrix, ieee_quiet_nan)
     end function quat_to_matrix
 
     !> Unit quaternion of a rotation matrix, up to sign; the scalar part comes back non-negative. NaN for a

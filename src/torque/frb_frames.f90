@@ -1,13 +1,14 @@
 !> What codes that keep other variables convert: angular velocity and momentum, vectors of the body and of
 !> space, the quaternion momentum of NO_SQUISH. For one body and for arrays (3, n), (4, n).
 !>
-!> All are functions. Arrays whose sizes do not match and bodies that could not be made give NaN.
+!> All are functions. Arrays whose sizes do not match, bodies that could not be made and quaternions whose
+!> norm is more than 1e-6 off one give NaN.
 module frb_frames
     use frb_free_flow, only: core_of, rigid_body
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
     use frb_modified_kicks, only: angular_response
-    use frb_rotations, only: rotate_one => quat_rotate, quat_conjugate
+    use frb_rotations, only: rotate_one => quat_rotate, quat_conjugate, unit_tolerance
     use frb_status, only: status_ok
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
     implicit none
@@ -216,23 +217,35 @@ contains
         real(wp), intent(in) :: sense
         real(wp), intent(in), contiguous :: q(:, :), v(:, :)
         real(wp), intent(out), contiguous :: w(:, :)
-        real(wp) :: q0, t1, t2, t3
+        real(wp) :: nan, two, q0, t1, t2, t3
         integer :: i
 
         if (size(q, 1) /= 4 .or. size(v, 1) /= 3 .or. size(q, 2) /= size(v, 2)) then
             w = ieee_value(w, ieee_quiet_nan)
             return
         end if
+        nan = ieee_value(nan, ieee_quiet_nan)
         do i = 1, size(v, 2)
+            two = two_or_nan(q(1, i), q(2, i), q(3, i), q(4, i), nan)
             q0 = sense*q(1, i)
-            t1 = 2*(q(3, i)*v(3, i) - q(4, i)*v(2, i))
-            t2 = 2*(q(4, i)*v(1, i) - q(2, i)*v(3, i))
-            t3 = 2*(q(2, i)*v(2, i) - q(3, i)*v(1, i))
+            t1 = two*(q(3, i)*v(3, i) - q(4, i)*v(2, i))
+            t2 = two*(q(4, i)*v(1, i) - q(2, i)*v(3, i))
+            t3 = two*(q(2, i)*v(2, i) - q(3, i)*v(1, i))
             w(1, i) = v(1, i) + (q0*t1 + (q(3, i)*t3 - q(4, i)*t2))
             w(2, i) = v(2, i) + (q0*t2 + (q(4, i)*t1 - q(2, i)*t3))
             w(3, i) = v(3, i) + (q0*t3 + (q(2, i)*t2 - q(3, i)*t1))
         end do
     end subroutine rotate_all
+
+    !> 2, or NaN unless q is of norm one: a factor, so that loops need not branch.
+    pure function two_or_nan(q0, q1, q2, q3, nan) result(two)
+        real(wp), intent(in) :: q0, q1, q2, q3, nan
+        real(wp) :: two
+        real(wp) :: square
+
+        square = (q0*q0 + q1*q1) + (q2*q2 + q3*q3)
+        two = merge(2.0_wp, nan, square >= (1 - unit_tolerance)**2 .and. square <= (1 + unit_tolerance)**2)
+    end function two_or_nan
 
     !> p4 of one body.
     pure function quat_momentum_one(q, m) result(p4)
@@ -246,17 +259,20 @@ contains
     pure function quat_momentum_many(q, m) result(p4)
         real(wp), intent(in), contiguous :: q(:, :), m(:, :)
         real(wp) :: p4(4, size(m, 2))
+        real(wp) :: nan, two
         integer :: i
 
         if (size(q, 1) /= 4 .or. size(m, 1) /= 3 .or. size(q, 2) /= size(m, 2)) then
             p4 = ieee_value(p4, ieee_quiet_nan)
             return
         end if
+        nan = ieee_value(nan, ieee_quiet_nan)
         do i = 1, size(m, 2)
-            p4(1, i) = -2*(q(2, i)*m(1, i) + q(3, i)*m(2, i) + q(4, i)*m(3, i))
-            p4(2, i) = 2*(q(1, i)*m(1, i) + (q(3, i)*m(3, i) - q(4, i)*m(2, i)))
-            p4(3, i) = 2*(q(1, i)*m(2, i) + (q(4, i)*m(1, i) - q(2, i)*m(3, i)))
-            p4(4, i) = 2*(q(1, i)*m(3, i) + (q(2, i)*m(2, i) - q(3, i)*m(1, i)))
+            two = two_or_nan(q(1, i), q(2, i), q(3, i), q(4, i), nan)
+            p4(1, i) = -two*(q(2, i)*m(1, i) + q(3, i)*m(2, i) + q(4, i)*m(3, i))
+            p4(2, i) = two*(q(1, i)*m(1, i) + (q(3, i)*m(3, i) - q(4, i)*m(2, i)))
+            p4(3, i) = two*(q(1, i)*m(2, i) + (q(4, i)*m(1, i) - q(2, i)*m(3, i)))
+            p4(4, i) = two*(q(1, i)*m(3, i) + (q(2, i)*m(2, i) - q(3, i)*m(1, i)))
         end do
     end function quat_momentum_many
 
@@ -272,16 +288,19 @@ contains
     pure function momentum_from_quat_many(q, p4) result(m)
         real(wp), intent(in), contiguous :: q(:, :), p4(:, :)
         real(wp) :: m(3, size(p4, 2))
+        real(wp) :: nan, half
         integer :: i
 
         if (size(q, 1) /= 4 .or. size(p4, 1) /= 4 .or. size(q, 2) /= size(p4, 2)) then
             m = ieee_value(m, ieee_quiet_nan)
             return
         end if
+        nan = ieee_value(nan, ieee_quiet_nan)
         do i = 1, size(p4, 2)
-            m(1, i) = 0.5_wp*((q(1, i)*p4(2, i) - p4(1, i)*q(2, i)) + (q(4, i)*p4(3, i) - q(3, i)*p4(4, i)))
-            m(2, i) = 0.5_wp*((q(1, i)*p4(3, i) - p4(1, i)*q(3, i)) + (q(2, i)*p4(4, i) - q(4, i)*p4(2, i)))
-            m(3, i) = 0.5_wp*((q(1, i)*p4(4, i) - p4(1, i)*q(4, i)) + (q(3, i)*p4(2, i) - q(2, i)*p4(3, i)))
+            half = 0.25_wp*two_or_nan(q(1, i), q(2, i), q(3, i), q(4, i), nan)
+            m(1, i) = half*((q(1, i)*p4(2, i) - p4(1, i)*q(2, i)) + (q(4, i)*p4(3, i) - q(3, i)*p4(4, i)))
+            m(2, i) = half*((q(1, i)*p4(3, i) - p4(1, i)*q(3, i)) + (q(2, i)*p4(4, i) - q(4, i)*p4(2, i)))
+            m(3, i) = half*((q(1, i)*p4(4, i) - p4(1, i)*q(4, i)) + (q(3, i)*p4(2, i) - q(2, i)*p4(3, i)))
         end do
     end function momentum_from_quat_many
 

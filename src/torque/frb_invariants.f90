@@ -13,7 +13,7 @@ module frb_invariants
     public :: kinetic_energy, total_energy, spatial_momentum, norm_defect, invariant_monitor
 
     !> T = sum of m_j^2/(2 I_j), of one body or of all: kinetic_energy(body, m). For n bodies m is (3, n),
-    !> body a scalar or body(n).
+    !> body a scalar or body(n). NaN for sizes that do not match or a body that could not be made.
     interface kinetic_energy
         module procedure kinetic_energy_of_body
         module procedure kinetic_energy_alike
@@ -21,14 +21,15 @@ module frb_invariants
     end interface kinetic_energy
 
     !> T + V: total_energy(body, scene, t, m, q), of one body or of all. NaN when the scene gives no
-    !> potential or refuses. Constant in time when the potential does not depend on time.
+    !> potential or refuses, and for sizes that do not match. Constant in time when the potential does not depend on time.
     interface total_energy
         module procedure total_energy_of_body
         module procedure total_energy_alike
         module procedure total_energy_of_group
     end interface total_energy
 
-    !> Angular momentum in the space frame, Q m: spatial_momentum(m, q), of one body or summed over all.
+    !> Angular momentum in the space frame, Q m: spatial_momentum(m, q), of one body or summed over all. NaN
+    !> for sizes that do not match or q not of norm one.
     !> Under a torque its component along an axis is constant when turning the body about that axis in space
     !> leaves the potential as it is: along `force` for a heavy top.
     interface spatial_momentum
@@ -63,7 +64,7 @@ contains
         defect = square_defect/(1 + sqrt(max(1 + square_defect, 0.0_wp)))
     end function norm_defect
 
-    !> T of one body; 0 for a body that could not be made.
+    !> T of one body.
     pure function kinetic_energy_of_body(body, m) result(energy)
         type(rigid_body), intent(in) :: body
         real(wp), intent(in) :: m(3)    !! angular momentum, body frame
@@ -74,6 +75,7 @@ contains
             along = m
             if (core%needs_rotation) along = matmul(m, core%axes)
             energy = 0.5_wp*sum(core%a*along(core%order)**2)
+            if (core%status /= status_ok) energy = ieee_value(energy, ieee_quiet_nan)
         end associate
     end function kinetic_energy_of_body
 
@@ -93,11 +95,24 @@ contains
         real(wp) :: energy
         integer :: i
 
+        energy = ieee_value(energy, ieee_quiet_nan)
+        if (.not. matches(size(body), m)) return
         energy = 0.0_wp
         do i = 1, size(m, 2)
             energy = energy + kinetic_energy_of_body(body(min(i, size(body))), m(:, i))
         end do
     end function kinetic_energy_of_group
+
+    !> Whether momenta (3, n), attitudes (4, n) and a number of bodies, 1 or n, belong together.
+    pure function matches(bodies, m, q) result(good)
+        integer, intent(in) :: bodies
+        real(wp), intent(in) :: m(:, :)
+        real(wp), intent(in), optional :: q(:, :)
+        logical :: good
+
+        good = size(m, 1) == 3 .and. (bodies == 1 .or. bodies == size(m, 2))
+        if (good .and. present(q)) good = size(q, 1) == 4 .and. size(q, 2) == size(m, 2)
+    end function matches
 
     !> T + V of one body.
     function total_energy_of_body(body, scene, t, m, q) result(energy)
@@ -132,6 +147,8 @@ contains
         real(wp) :: energy, v
         integer :: stat
 
+        energy = ieee_value(energy, ieee_quiet_nan)
+        if (.not. matches(size(body), m, q)) return
         call scene%potential(q, t, v, stat)
         energy = kinetic_energy_of_group(body, m) + v
         if (stat /= status_ok) energy = ieee_value(v, ieee_quiet_nan)
@@ -151,6 +168,8 @@ contains
         real(wp) :: momentum(3)
         integer :: i
 
+        momentum = ieee_value(momentum, ieee_quiet_nan)
+        if (.not. matches(1, m, q)) return
         momentum = 0.0_wp
         do i = 1, size(m, 2)
             momentum = momentum + quat_rotate(q(:, i), m(:, i))

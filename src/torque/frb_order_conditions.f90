@@ -48,7 +48,8 @@ contains
     !> The order of the product of exp(drifts(1) A), exp(kicks(1) B + modified(1) C), exp(drifts(2) A) ...,
     !> or, unless `drift_first`, of exp(kicks(1) B + modified(1) C), exp(drifts(1) A) ...
     !> A condition counts as met when its residual is at most `tolerance`; the default stands well above the
-    !> rounding of coefficients given to 14 digits and well below any condition missed.
+    !> rounding of coefficients given to 14 digits and well below any condition missed. Order 0 when numbers
+    !> of coefficients do not match.
     pure function order_conditions(drifts, kicks, drift_first, tolerance, modified) result(report)
         real(wp), intent(in) :: drifts(:), kicks(:)     !! coefficients a and b in the order of use, finite
         logical, intent(in) :: drift_first              !! whether drifts(1) comes before kicks(1)
@@ -60,10 +61,14 @@ contains
         real(wp) :: reduced(longest_word, 0:longest_word)
         integer :: length, count, word, most, i, k
 
+        if (abs(size(drifts) - size(kicks)) > 1) return
         met = 1.0e-12_wp
         if (present(tolerance)) met = tolerance
         c = 0.0_wp
-        if (present(modified)) c = modified
+        if (present(modified)) then
+            if (size(modified) /= size(c)) return
+            c = modified
+        end if
         series = 0.0_wp
         series(1) = 1.0_wp
         do i = 1, max(size(drifts), size(kicks))

@@ -35,7 +35,7 @@ module frb_schemes
     use frb_kinds, only: wp
     use frb_order_conditions, only: order_report, order_conditions
     use frb_status, only: status_ok, status_bad_scheme, status_bad_option
-    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_quiet_nan, ieee_value
     implicit none
     private
 
@@ -325,12 +325,16 @@ contains
 
     !> The palindrome of `count` coefficients whose first half, the centre included, is `half`.
     pure function mirrored(half, count) result(full)
-        real(wp), intent(in) :: half(:)     !! size at least (count + 1)/2
+        real(wp), intent(in) :: half(:)     !! size at least (count + 1)/2, else all is NaN
         integer, intent(in) :: count
         real(wp) :: full(count)
         integer :: i
 
-        full = [(half(min(i, count + 1 - i)), i=1, count)]
+        if (size(half) >= (count + 1)/2) then
+            full = [(half(min(i, count + 1 - i)), i=1, count)]
+        else
+            full = ieee_value(full, ieee_quiet_nan)
+        end if
     end function mirrored
 
 end module frb_schemes
