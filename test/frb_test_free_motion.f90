@@ -30,7 +30,7 @@ contains
         integer :: i, stat
         logical :: same
 
-        call t%open_suite('free-motion', 50)
+        call t%open_suite('free-motion', 51)
         nan = ieee_value(1.0_wp, ieee_quiet_nan)
         call read_cases('data/reference/cases.txt', cases)
         worst_m = 0.0_wp
@@ -148,6 +148,18 @@ contains
         call check_way(t, [1.0_wp, 100.0_wp, 100.0_wp], [0.9_wp, 0.2_wp, 0.1_wp], 'of-a-symmetric-rod')
         call check_way(t, [2.0_wp, 2.0001_wp, 3.0_wp], [0.1_wp, 0.3_wp, 0.9_wp], 'of-a-body-nearly-oblate')
 
+        call t%close_to('precession-agrees-with-25-digits', [ &
+            relative([1.0_wp, 100.0_wp, 100.5_wp], [0.9_wp, 0.2_wp, 0.1_wp], &
+                     6.523168684893318828514299e-2_wp), &
+            relative([0.001_wp, 1.0_wp, 1.0005_wp], [0.5_wp, 0.3_wp, 0.001_wp], &
+                     7.332900834272230187987869e-3_wp), &
+            relative([1.0_wp, 2.0_wp, 3.0_wp], [0.9_wp, 0.9_wp, 0.4_wp], 6.597142739268479195382250_wp), &
+            relative([1.0_wp, 2.0_wp, 3.0_wp], [0.1_wp, 0.2_wp, 0.9_wp], 6.628755948142308895147843_wp), &
+            relative([2.0_wp, 2.0001_wp, 3.0_wp], [0.1_wp, 0.3_wp, 0.9_wp], 13.69699563606114185585459_wp), &
+            relative([1.0_wp, 1.5_wp, 4.0_wp], [0.5_wp, 0.3_wp, 0.35_wp], 10.68799431646088551582323_wp), &
+            relative([1.0_wp, 3.0_wp, 3.5_wp], [0.7_wp, 0.5_wp, 0.3_wp], 3.655799076152315290256536_wp)], &
+            [0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], 4*eps)
+
         ! |m| T/I1 about the symmetry axis of an oblate body, by its moments and by its tensor.
         motion = free_motion(rigid_body([2.0_wp, 2.0_wp, 3.0_wp]), [0.0_wp, 0.6_wp, 0.1_wp], start)
         rate = sqrt(0.37_wp)/2
@@ -161,6 +173,16 @@ contains
         call t%ok('no-precession-on-the-separatrix', ieee_is_nan(motion%precession()) &
                   .and. .not. ieee_is_finite(motion%precession_period()))
     end subroutine check_precession
+
+    !> How far the precession is off the value by extrapolated integration in quadruple precision.
+    function relative(moments, m0, expected) result(error)
+        real(wp), intent(in) :: moments(3), m0(3), expected
+        real(wp) :: error
+        type(free_motion) :: motion
+
+        motion = free_motion(rigid_body(moments), m0, unit)
+        error = motion%precession()/expected - 1
+    end function relative
 
     subroutine check_way(t, moments, m0, name)
         type(tally), intent(inout) :: t
