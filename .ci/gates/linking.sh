@@ -121,3 +121,26 @@ tests_by_flang() {
     if grep -i 'warning:' log; then return 1; fi
     grep -E '^[0-9]+ skipped$' log
 }
+
+# FORD has no complaint about what a user sees, and its front page has every public name. (It knows nothing of the text
+# of `module procedure` lines, nor of local variables.)
+pages_of_public_names() {
+    local name names
+    names=$(sed -n '/^module frb$/,/implicit none/p' src/frb.f90 | sed 's/&$//' | tr '\n' ' ' |
+        sed 's/use [a-z_]*, only:/,/g; s/=> [a-z_]*//g; s/.*module frb//; s/implicit none.*//' | tr -s ', ' '\n')
+    [ "$(wc -w <<<"$names")" -ge 60 ]
+    for name in $names; do
+        grep -Eq "(\[\[|\`)$name(\]\]|\`)" src/frb.md || { echo "src/frb.md lacks $name"; return 1; }
+    done
+    ./run docs -w >pages 2>&1 || { tail -n 20 pages; return 1; }
+    [ -e build/docs/index.html ]
+    grep -q 'proc/frb_step.html' build/docs/index.html
+    tr '\n' ' ' <pages | sed 's/Warning: /\n&/g' >warnings
+    if grep -E 'Could not substitute|metadata' warnings; then return 1; fi
+    local public
+    public=$(for name in $names; do
+        grep -lE "^ *(module|.*subroutine|.*function|interface|type.*::) $name\b" src/*/*.f90 || true
+    done | sort -u | sed 's|.*/||' | tr '\n' '|')
+    if grep -E "Undocumented (bound|interface|type|proc|function|subroutine|module )" warnings |
+        grep -E "'(${public%|})'"; then return 1; fi
+}

@@ -76,6 +76,7 @@ contains
         call conclude(code, 'drift_by_name', stat)
     end subroutine drift_by_name
 
+    !> The exact flow.
     subroutine advance_by_flow(self, body, h, m, q, stat)
         class(flow_drift), intent(in) :: self
         type(rigid_body), intent(in) :: body
@@ -108,6 +109,7 @@ contains
         call from_principal(core_of(body), m, q)
     end subroutine advance_by_matrix
 
+    !> The step of the quaternion, in principal axes.
     subroutine advance_by_quaternion(self, body, h, m, q, stat)
         class(quaternion_drift), intent(in) :: self
         type(rigid_body), intent(in) :: body

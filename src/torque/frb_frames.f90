@@ -52,8 +52,8 @@ module frb_frames
         module procedure quat_momentum_many
     end interface quat_momentum
 
-    !> Back: momentum_from_quat(q, p4) is the vector part of q* p4/2, for a unit quaternion q. What p4 has
-    !> along q, 0 in an exact run, is left out.
+    !> The way back, momentum_from_quat(q, p4), is the vector part of q* p4/2, for a unit quaternion q. What
+    !> p4 has along q, 0 in an exact run, is left out.
     interface momentum_from_quat
         module procedure momentum_from_quat_one
         module procedure momentum_from_quat_many
