@@ -155,7 +155,7 @@ contains
                 reached = 0.0_wp
             end if
         end if
-        if (body%parity < 0.0_wp) call reflect(body%order(3), transition, jacobian)
+        if (body%parity < 0.0_wp) call reflect(int(body%order(3)), transition, jacobian)
         if (present(by_inertia)) call inertia_columns(body, parts, m, elements, by_inertia)
         if (reached < 1.0_wp) call follow_axis(body, h - rest, m, elements, q, transition, jacobian, &
                                                by_inertia)
