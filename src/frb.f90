@@ -5,7 +5,7 @@ module frb
     use frb_status, only: status_message, status_ok, status_bad_moments, status_bad_tensor, &
         status_bad_momentum, status_bad_attitude, status_bad_time, status_bad_count, status_bad_option, &
         status_bad_torque, status_bad_scheme, status_no_period, status_lapack_failed, status_stopped, &
-        status_not_offered
+        status_not_offered, status_too_rough
     use frb_rotations, only: quat_product, quat_conjugate, quat_to_matrix, matrix_to_quat
     use frb_inertia, only: principal_axes
     use frb_matrix_step, only: frb_step
@@ -17,13 +17,15 @@ module frb
         ellint_pi_between, gauss_legendre, eint_gauss
     use frb_order_conditions, only: order_report, order_conditions
     use frb_schemes, only: splitting_scheme, scheme_names, mirrored
-    use frb_torque, only: body_scene, group_scene, body_observer, group_observer, body_drift
+    use frb_torque, only: body_scene, group_scene, body_observer, group_observer, body_drift, &
+        scene_lanes
     use frb_scenes, only: heavy_top, plain_scene
     use frb_drifts, only: flow_drift, matrix_drift, quaternion_drift, drift_by_name
     use frb_frames, only: angular_velocity, angular_momentum, quat_rotate, quat_rotate_back, quat_momentum, &
         momentum_from_quat
     use frb_thermostats, only: langevin_kick
     use frb_splitting, only: integrate
+    use frb_extrapolation, only: extrapolate, extrapolation_report
     use frb_splitting_plan, only: splitting_plan
     use frb_invariants, only: kinetic_energy, total_energy, spatial_momentum, norm_defect, invariant_monitor
     implicit none

@@ -25,6 +25,7 @@ program check
     use frb_test_carlson, only: test_carlson
     use frb_test_agm, only: test_agm
     use frb_test_schemes, only: test_schemes
+    use frb_test_extrapolate, only: test_extrapolate
     use frb_test_modified_kicks, only: test_modified_kicks
     use frb_test_drifts, only: test_drifts
     use frb_test_splitting, only: test_splitting
@@ -95,6 +96,7 @@ contains
         call suite(task, 'agm', test_agm)
         call suite(task, 'schemes', test_schemes)
         call suite(task, 'modified-kicks', test_modified_kicks)
+        call suite(task, 'extrapolate', test_extrapolate)
         call suite(task, 'drifts', test_drifts)
         call suite(task, 'splitting', test_splitting)
         call suite(task, 'groups', test_groups)

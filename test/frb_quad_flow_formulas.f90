@@ -14,7 +14,11 @@ contains
 
     include '../src/flow/series_formulas.inc'
 
+    include '../src/flow/tiny_formulas.inc'
+
     include '../src/flow/short_formulas.inc'
+
+    include '../src/flow/unit_turn_formulas.inc'
 
     include '../src/flow/middle_formulas.inc'
 

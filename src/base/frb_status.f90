@@ -15,6 +15,7 @@ module frb_status
     public :: status_ok, status_bad_moments, status_bad_tensor, status_bad_momentum, status_bad_attitude
     public :: status_bad_time, status_bad_count, status_bad_option, status_bad_torque, status_bad_scheme
     public :: status_no_period, status_lapack_failed, status_stopped, status_not_offered
+    public :: status_too_rough
 
     integer, parameter :: status_ok = 0             !! done
     integer, parameter :: status_bad_moments = 1    !! moments not finite and positive, nor a linear rotor's
@@ -30,6 +31,7 @@ module frb_status
     integer, parameter :: status_lapack_failed = 11 !! an eigensolver of LAPACK did not converge
     integer, parameter :: status_stopped = 12       !! an observer ended the run
     integer, parameter :: status_not_offered = 13   !! a scene does not tell this
+    integer, parameter :: status_too_rough = 14     !! a torque is too rough for the tolerance
 
 contains
 
@@ -82,6 +84,8 @@ contains
             message = 'the eigensolver of LAPACK did not converge'
         case (status_not_offered)
             message = 'the scene does not tell this'
+        case (status_too_rough)
+            message = 'the torque is too rough for the tolerance'
         case (status_stopped)
             message = 'an observer ended the run'
         case default

@@ -386,6 +386,8 @@ contains
 
     include 'series_formulas.inc'
 
+    include 'tiny_formulas.inc'
+
     include 'middle_formulas.inc'
 
 end module frb_flow_lanes

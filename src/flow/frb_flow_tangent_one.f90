@@ -222,7 +222,11 @@ contains
 
     include 'series_formulas.inc'
 
+    include 'tiny_formulas.inc'
+
     include 'short_formulas.inc'
+
+    include 'unit_turn_formulas.inc'
 
     include 'middle_formulas.inc'
 

@@ -3,7 +3,7 @@ module frb_scenes
     use frb_kinds, only: wp
     use frb_rotations, only: cross, quat_rotate
     use frb_status, only: status_ok, status_bad_torque
-    use frb_torque, only: body_scene
+    use frb_torque, only: body_scene, lanes => scene_lanes
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
     implicit none
     private
@@ -18,6 +18,7 @@ module frb_scenes
     contains
         procedure :: torque => heavy_top_torque    !! u x centre
         procedure :: torque_change => heavy_top_torque_change    !! its derivative along a turn
+        procedure :: torque_lanes => heavy_top_torque_lanes    !! the torque in lanes
         procedure :: potential => heavy_top_potential    !! force . Q centre
     end type heavy_top
 
@@ -63,12 +64,34 @@ contains
 
         associate (unused_t => t)
         end associate
-        call force_in_body(self%force, q, u1, u2, u3)
+        call force_in_body(self%force, q(1), q(2), q(3), q(4), u1, u2, u3)
         tau(1) = u2*self%centre(3) - u3*self%centre(2)
         tau(2) = u3*self%centre(1) - u1*self%centre(3)
         tau(3) = u1*self%centre(2) - u2*self%centre(1)
         stat = status_ok
     end subroutine heavy_top_torque
+
+    !> The same in lanes.
+    pure subroutine heavy_top_torque_lanes(self, q, t, tau, stat)
+        class(heavy_top), intent(inout) :: self
+        real(wp), intent(in) :: q(lanes, 4), t(lanes)
+        real(wp), intent(out) :: tau(lanes, 3)
+        integer, intent(out) :: stat
+        real(wp) :: force(3), centre(3), u1, u2, u3
+        integer :: l
+
+        associate (unused_t => t)
+        end associate
+        force = self%force
+        centre = self%centre
+        do l = 1, lanes
+            call force_in_body(force, q(l, 1), q(l, 2), q(l, 3), q(l, 4), u1, u2, u3)
+            tau(l, 1) = u2*centre(3) - u3*centre(2)
+            tau(l, 2) = u3*centre(1) - u1*centre(3)
+            tau(l, 3) = u1*centre(2) - u2*centre(1)
+        end do
+        stat = status_ok
+    end subroutine heavy_top_torque_lanes
 
     !> As u changes by u x n: (u x n) x centre.
     pure subroutine heavy_top_torque_change(self, q, t, n, change, stat)
@@ -80,25 +103,25 @@ contains
 
         associate (unused_t => t)
         end associate
-        call force_in_body(self%force, q, u1, u2, u3)
+        call force_in_body(self%force, q(1), q(2), q(3), q(4), u1, u2, u3)
         change = cross(cross([u1, u2, u3], n), self%centre)
         stat = status_ok
     end subroutine heavy_top_torque_change
 
     !> u = Q^T f. Written out in short chains of operations: a call of quat_rotate would cost more than that.
     !> w = 2 f x q, u = f + q0 w + w x q.
-    pure subroutine force_in_body(force, q, u1, u2, u3)
-        real(wp), intent(in) :: force(3), q(4)
+    pure subroutine force_in_body(force, q0, q1, q2, q3, u1, u2, u3)
+        real(wp), intent(in) :: force(3), q0, q1, q2, q3
         real(wp), intent(out) :: u1, u2, u3
         real(wp) :: f(3), w1, w2, w3
 
         f = 2*force
-        w1 = f(2)*q(4) - f(3)*q(3)
-        w2 = f(3)*q(2) - f(1)*q(4)
-        w3 = f(1)*q(3) - f(2)*q(2)
-        u1 = (force(1) + q(1)*w1) + (w2*q(4) - w3*q(3))
-        u2 = (force(2) + q(1)*w2) + (w3*q(2) - w1*q(4))
-        u3 = (force(3) + q(1)*w3) + (w1*q(3) - w2*q(2))
+        w1 = f(2)*q3 - f(3)*q2
+        w2 = f(3)*q1 - f(1)*q3
+        w3 = f(1)*q2 - f(2)*q1
+        u1 = (force(1) + q0*w1) + (w2*q3 - w3*q2)
+        u2 = (force(2) + q0*w2) + (w3*q1 - w1*q3)
+        u3 = (force(3) + q0*w3) + (w1*q2 - w2*q1)
     end subroutine force_in_body
 
     !> V = force . Q centre.

@@ -16,7 +16,9 @@ module frb_torque
     implicit none
     private
 
-    public :: body_scene, group_scene, body_observer, group_observer, body_drift
+    public :: body_scene, group_scene, body_observer, group_observer, body_drift, scene_lanes
+
+    integer, parameter :: scene_lanes = 4     !! attitudes at a time that `torque_lanes` is asked for
 
     !> The torque on one body. Extend it with the scene's parameters, give `torque`, and give `potential` too
     !> where there is one and the energy is to be watched.
@@ -24,6 +26,7 @@ module frb_torque
     contains
         procedure(torque_on_body), deferred :: torque    !! the torque
         procedure :: torque_change => body_change_unknown    !! its derivative, for modified kicks
+        procedure :: torque_lanes => torque_lane_by_lane    !! the torque in lanes, for `extrapolate`
         procedure :: potential => body_potential_unknown    !! the potential, where there is one
         procedure :: agree => body_alone    !! hook of runs on many processes
     end type body_scene
@@ -118,6 +121,26 @@ module frb_torque
     end interface
 
 contains
+
+    !> The torques at several attitudes and times, for `extrapolate`: a scene that computes them in a loop
+    !> over the lanes, which the compiler turns into vectors, saves what single calls cost. By default these.
+    subroutine torque_lane_by_lane(self, q, t, tau, stat)
+        class(body_scene), intent(inout) :: self
+        real(wp), intent(in) :: q(scene_lanes, 4)         !! attitudes: a column for each component
+        real(wp), intent(in) :: t(scene_lanes)            !! their times
+        real(wp), intent(out) :: tau(scene_lanes, 3)      !! torques, body frame
+        integer, intent(out) :: stat                !! `status_ok`, or a code that ends the run
+        real(wp) :: attitude(4), one(3)
+        integer :: l, code
+
+        stat = status_ok
+        do l = 1, scene_lanes
+            attitude = q(l, :)
+            call self%torque(attitude, t(l), one, code)
+            tau(l, :) = one
+            if (stat == status_ok) stat = code
+        end do
+    end subroutine torque_lane_by_lane
 
     !> How the torque changes as the body turns: change = d/de tau(q exp(e n), t) at e = 0, body frame, for
     !> schemes with a modified kick (frb_modified_kicks); stat, `status_ok` or a code that ends the run. By
