@@ -73,7 +73,7 @@ contains
         integer :: i
 
         call open_script(options, 'water', 900, 620, file)
-        call file%put('set title "64 rigid water molecules: exact rotation and NO_SQUISH (dashed)" noenhanced')
+        call file%put('set title "64 rigid water molecules: exact rotation, NO_SQUISH (dashed)" noenhanced')
         call file%put('set xlabel "forces per fs"')
         call file%put('set ylabel "rms of the energy [kcal/mol]"')
         call file%put('set logscale xy')
