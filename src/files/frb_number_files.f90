@@ -13,6 +13,8 @@
 module frb_number_files
     use frb_kinds, only: wp
     use frb_number_words, only: is_blank, is_too_large, is_value, quoted, split_value
+    use frb_system, only: c_realpath
+    use, intrinsic :: iso_c_binding, only: c_associated, c_null_char
     use, intrinsic :: iso_fortran_env, only: input_unit
     implicit none
     private
@@ -24,6 +26,9 @@ module frb_number_files
 
     !> Longest line accepted, so that a file without line ends is refused in time.
     integer, parameter :: longest_line = 100000
+
+    !> Longest path that links may lead to.
+    integer, parameter :: longest_path = 4096
 
     !> Characters taken from the file at a time.
     integer, parameter :: piece = 512
@@ -99,11 +104,27 @@ contains
         class(number_file), intent(in) :: self
         character(*), intent(in) :: path
         logical :: same
+        character(:), allocatable :: real_path
         integer :: unit, io
 
+        ! Most compilers know an open file by any of its names, some by the one it was opened with.
         inquire (file=path, number=unit, iostat=io)
         same = io == 0 .and. unit == self%unit
+        if (same) return
+        real_path = without_links(path)
+        same = len(real_path) > 0 .and. real_path == without_links(self%path)
     end function is_file
+
+    !> A path from the root without links and dots; '' if there is no such file.
+    function without_links(path) result(whole)
+        character(*), intent(in) :: path
+        character(:), allocatable :: whole
+        character(longest_path) :: text
+
+        whole = ''
+        text = ''
+        if (c_associated(c_realpath(path//c_null_char, text))) whole = text(:index(text, c_null_char) - 1)
+    end function without_links
 
     !> Goes back to the first number. With `by_lines` every item then begins a line, as if each were read by a
     !> statement of its own: numbers left on a line are dropped, and `surplus` tells the first of them.
