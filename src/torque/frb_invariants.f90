@@ -21,7 +21,8 @@ module frb_invariants
     end interface kinetic_energy
 
     !> T + V: total_energy(body, scene, t, m, q), of one body or of all. NaN when the scene gives no
-    !> potential or refuses, and for sizes that do not match. Constant in time when the potential does not depend on time.
+    !> potential or refuses, and for sizes that do not match. Constant in time when the potential does not
+    !> depend on time.
     interface total_energy
         module procedure total_energy_of_body
         module procedure total_energy_alike
