@@ -20,7 +20,10 @@ kinds=()
 
 # Copies of the tree, logs and what the gates make.
 work=$(mktemp -d) || exit 1
-trap 'kill $(jobs -p) 2>/dev/null; wait; rm -rf "$work"' EXIT
+# Each gate is a process group, so that all of it ends with this script.
+set -m
+trap 'for group in $(jobs -p); do kill -- "-$group"; done 2>/dev/null; wait; rm -rf "$work"' EXIT
+trap 'exit 130' INT TERM
 
 # The tree as git sees it, without what it ignores.
 git -c safe.directory='*' ls-files -z --cached --others --exclude-standard |
