@@ -11,6 +11,7 @@ module frb
     use frb_matrix_step, only: frb_step
     use frb_quat_step, only: quat_step
     use frb_free_flow, only: flow_tangent, free_flow, rigid_body
+    use frb_free_flow_many, only: free_flow, free_flow_columns
     use frb_free_motion, only: free_motion
     use frb_elliptic, only: carlson_rf => rf, carlson_rc => rc, carlson_rj => rj, carlson_rd => rd, &
         jacobi_functions => jacobi, ellip_k, ellip_f, jacobi_am, landen_step, ellpi, ellint_pi, &

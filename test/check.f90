@@ -39,6 +39,7 @@ program check
     use frb_test_flow_laws, only: test_flow_laws
     use frb_test_flow_runs, only: test_flow_runs
     use frb_test_flow_batches, only: test_flow_batches
+    use frb_test_flow_columns, only: test_flow_columns
     use frb_test_flow_series, only: test_flow_series
     use frb_test_status, only: test_status, stop_in_the_library
     use frb_test_tangent, only: test_tangent
@@ -109,6 +110,7 @@ contains
         call suite(task, 'flow-laws', test_flow_laws)
         call suite(task, 'flow-runs', test_flow_runs)
         call suite(task, 'flow-batches', test_flow_batches)
+        call suite(task, 'flow-columns', test_flow_columns)
         call suite(task, 'flow-series', test_flow_series)
         call suite(task, 'tangent', test_tangent)
         call suite(task, 'tangent-laws', test_tangent_laws)

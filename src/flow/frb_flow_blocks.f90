@@ -76,12 +76,12 @@ contains
         integer, intent(in) :: bodies, first, count, full
         type(body_core), intent(in) :: body(bodies)
         type(block_of_bodies), intent(inout) :: block
-        integer :: l, given
+        integer :: l, given, before
 
-        given = count
-        if (bodies == 1) given = 1
+        given = merge(1, count, bodies == 1)
+        before = merge(0, first - 1, bodies == 1)
         do l = 1, given
-            associate (one => body(first + l - 1))
+            associate (one => body(before + l))
                 block%lane(l) = one%lane
                 block%of%a(l) = one%alpha
                 block%of%b(l) = one%beta

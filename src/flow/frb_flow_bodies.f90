@@ -12,7 +12,7 @@ module frb_flow_bodies
     implicit none
     private
 
-    public :: flow_many
+    public :: flow_many, check_many, flow_rows, all_finite
 
 contains
 
@@ -28,9 +28,7 @@ contains
         type(block_of_bodies) :: block
         integer :: first, count, refused
 
-        code = status_ok
-        if (bodies == 1) code = body(1)%status
-        if (code == status_ok .and. times == 1 .and. .not. ieee_is_finite(h(1))) code = status_bad_time
+        call check_many(body, bodies, h, times, code)
         if (code /= status_ok .or. n == 0) return
         refused = status_ok
         call set_bodies(body, bodies, h, times, 1, min(n, lanes), block)
@@ -47,6 +45,19 @@ contains
         !$omp end parallel do
         code = refused
     end subroutine flow_many
+
+    !> Whether the only body or the only time is refused, and so all states are.
+    pure subroutine check_many(body, bodies, h, times, code)
+        integer, intent(in) :: bodies, times
+        type(body_core), intent(in) :: body(bodies)
+        real(wp), intent(in) :: h(times)
+        integer, intent(out) :: code
+
+        code = status_ok
+        if (bodies == 1) code = body(1)%status
+        if (code /= status_ok .or. times /= 1) return
+        if (.not. ieee_is_finite(h(1))) code = status_bad_time
+    end subroutine check_many
 
     !> One block: in place if all is plain and the lanes are whole vectors.
     subroutine flow_rows(body, bodies, h, times, first, count, block, m, refused, q)

@@ -31,7 +31,7 @@ module frb_free_flow
     implicit none
     private
 
-    public :: rigid_body, free_flow, flow_tangent, core_of
+    public :: rigid_body, free_flow, flow_tangent, core_of, cores_of, turn_matrix
 
     !> A rigid body: `body = rigid_body(moments)` or `body = rigid_body(tensor)`. Its components are private,
     !> so that all routines see the same body; the functions below read it.
@@ -186,6 +186,14 @@ contains
         linear = self%core%linear
     end function body_is_linear
 
+    !> The cores of bodies, in place; for library modules.
+    function cores_of(bodies) result(cores)
+        type(rigid_body), intent(in), target :: bodies(:)
+        type(body_core), pointer :: cores(:)
+
+        cores => bodies%core
+    end function cores_of
+
     !> The constants of the body, for the other modules of the library.
     elemental function core_of(body) result(core)
         type(rigid_body), intent(in) :: body
@@ -245,14 +253,21 @@ contains
         real(wp), intent(inout) :: m(3)         !! body angular momentum
         real(wp), intent(inout) :: a(3, 3)      !! attitude, body to space
         integer, intent(out) :: stat
-        real(wp) :: q(4), change(3, 3)
+        real(wp) :: q(4)
 
         stat = status_bad_attitude
         if (.not. all(ieee_is_finite(a))) return
         q = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
         call flow_body(body%core, h, m, stat, q)
-        if (stat /= status_ok) return
-        ! E(q) - 1 = 2 q0 hat(q) + 2 hat(q)^2, small when the step is.
+        if (stat == status_ok) call turn_matrix(q, a)
+    end subroutine flow_matrix
+
+    !> a + a (E(q) - 1) for a turn q, E(q) - 1 = 2 q0 hat(q) + 2 hat(q)^2, small when the turn is.
+    pure subroutine turn_matrix(q, a)
+        real(wp), intent(in) :: q(4)
+        real(wp), intent(inout) :: a(3, 3)
+        real(wp) :: change(3, 3)
+
         change(1, 1) = -2*(q(3)*q(3) + q(4)*q(4))
         change(2, 1) = 2*(q(2)*q(3) + q(1)*q(4))
         change(3, 1) = 2*(q(2)*q(4) - q(1)*q(3))
@@ -263,7 +278,7 @@ contains
         change(2, 3) = 2*(q(3)*q(4) - q(1)*q(2))
         change(3, 3) = -2*(q(2)*q(2) + q(3)*q(3))
         a = a + matmul(a, change)
-    end subroutine flow_matrix
+    end subroutine turn_matrix
 
     !> The same; stops where `stat` would not be `status_ok`.
     subroutine flow_matrix_or_stop(body, h, m, a)
@@ -290,9 +305,8 @@ contains
         call conclude(code, 'free_flow', stat)
     end subroutine flow_momenta
 
-    !> Advances the momenta and attitudes of n equal bodies, in blocks that fill SIMD lanes (a body given by a
-    !> tensor goes one by one). A body that is refused keeps its state and the
-    !> others go on; `stat` then tells why (the largest code, if there are several).
+    !> Advances the momenta and attitudes of n equal bodies, in blocks that fill SIMD lanes. A body that is
+    !> refused keeps its state and the others go on; `stat` then tells why (the largest code of several).
     subroutine flow_quaternions(body, h, m, q, stat)
         type(rigid_body), intent(in) :: body
         real(wp), intent(in) :: h

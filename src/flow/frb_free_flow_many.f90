@@ -1,0 +1,257 @@
+!> More ways to call `free_flow` for many bodies, each with its own time h(n) or with matrices, and
+!> `free_flow_columns` for states that are columns. Status, accuracy and threads as for the other ways.
+module frb_free_flow_many
+    use frb_flow_bodies, only: flow_many
+    use frb_flow_columns, only: flow_columns
+    use frb_free_flow, only: rigid_body, core_of, cores_of, turn_matrix
+    use frb_inertia, only: body_core
+    use frb_kinds, only: wp
+    use frb_status, only: conclude, status_ok, status_bad_count
+    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+    implicit none
+    private
+
+    public :: free_flow, free_flow_columns
+
+    !> `call free_flow(body, h, m [, q or a] [, stat])`: body or body(n), h or h(n), m(3,n), q(4,n), a(3,3,n).
+    interface free_flow
+        module procedure momenta_of_body_at_times
+        module procedure momenta_of_bodies_at_times
+        module procedure quaternions_of_body_at_times
+        module procedure quaternions_of_bodies_at_times
+        module procedure matrices_of_body_at_time
+        module procedure matrices_of_body_at_times
+        module procedure matrices_of_bodies_at_time
+        module procedure matrices_of_bodies_at_times
+    end interface free_flow
+
+    !> `call free_flow_columns(body, h, m1, m2, m3 [, q0, q1, q2, q3] [, stat])`: body or body(n), h or h(n),
+    !> all others (n); the q all or none. No state is copied: the fastest way.
+    interface free_flow_columns
+        module procedure columns_of_body_at_time
+        module procedure columns_of_body_at_times
+        module procedure columns_of_bodies_at_time
+        module procedure columns_of_bodies_at_times
+    end interface free_flow_columns
+
+    integer, parameter :: chunk = 64    !! matrices turned at a time
+
+contains
+
+    !> The momenta of n equal bodies, by the times h(n).
+    subroutine momenta_of_body_at_times(body, h, m, stat)
+        type(rigid_body), intent(in) :: body
+        real(wp), intent(in) :: h(:)
+        real(wp), intent(inout), contiguous :: m(:, :)
+        integer, intent(out), optional :: stat
+
+        call rows([core_of(body)], h, size(h), m, stat)
+    end subroutine momenta_of_body_at_times
+
+    !> The momenta of the n bodies body(n), by the times h(n).
+    subroutine momenta_of_bodies_at_times(body, h, m, stat)
+        type(rigid_body), intent(in), target :: body(:)
+        real(wp), intent(in) :: h(:)
+        real(wp), intent(inout), contiguous :: m(:, :)
+        integer, intent(out), optional :: stat
+
+        call rows(cores_of(body), h, size(body), m, stat)
+    end subroutine momenta_of_bodies_at_times
+
+    !> The momenta and quaternions of n equal bodies, by the times h(n).
+    subroutine quaternions_of_body_at_times(body, h, m, q, stat)
+        type(rigid_body), intent(in) :: body
+        real(wp), intent(in) :: h(:)
+        real(wp), intent(inout), contiguous :: m(:, :), q(:, :)
+        integer, intent(out), optional :: stat
+
+        call rows([core_of(body)], h, size(h), m, stat, q)
+    end subroutine quaternions_of_body_at_times
+
+    !> The momenta and quaternions of the n bodies body(n), by the times h(n).
+    subroutine quaternions_of_bodies_at_times(body, h, m, q, stat)
+        type(rigid_body), intent(in), target :: body(:)
+        real(wp), intent(in) :: h(:)
+        real(wp), intent(inout), contiguous :: m(:, :), q(:, :)
+        integer, intent(out), optional :: stat
+
+        call rows(cores_of(body), h, size(body), m, stat, q)
+    end subroutine quaternions_of_bodies_at_times
+
+    !> The momenta and matrices of n equal bodies, by h.
+    subroutine matrices_of_body_at_time(body, h, m, a, stat)
+        type(rigid_body), intent(in) :: body
+        real(wp), intent(in) :: h
+        real(wp), intent(inout), contiguous :: m(:, :), a(:, :, :)
+        integer, intent(out), optional :: stat
+
+        call matrices([core_of(body)], [h], size(m, 2), m, a, stat)
+    end subroutine matrices_of_body_at_time
+
+    !> The momenta and matrices of n equal bodies, by the times h(n).
+    subroutine matrices_of_body_at_times(body, h, m, a, stat)
+        type(rigid_body), intent(in) :: body
+        real(wp), intent(in) :: h(:)
+        real(wp), intent(inout), contiguous :: m(:, :), a(:, :, :)
+        integer, intent(out), optional :: stat
+
+        call matrices([core_of(body)], h, size(h), m, a, stat)
+    end subroutine matrices_of_body_at_times
+
+    !> The momenta and matrices of the n bodies body(n), by h.
+    subroutine matrices_of_bodies_at_time(body, h, m, a, stat)
+        type(rigid_body), intent(in), target :: body(:)
+        real(wp), intent(in) :: h
+        real(wp), intent(inout), contiguous :: m(:, :), a(:, :, :)
+        integer, intent(out), optional :: stat
+
+        call matrices(cores_of(body), [h], size(body), m, a, stat)
+    end subroutine matrices_of_bodies_at_time
+
+    !> The momenta and matrices of the n bodies body(n), by the times h(n).
+    subroutine matrices_of_bodies_at_times(body, h, m, a, stat)
+        type(rigid_body), intent(in), target :: body(:)
+        real(wp), intent(in) :: h(:)
+        real(wp), intent(inout), contiguous :: m(:, :), a(:, :, :)
+        integer, intent(out), optional :: stat
+
+        call matrices(cores_of(body), h, size(body), m, a, stat)
+    end subroutine matrices_of_bodies_at_times
+
+    !> The columns of n equal bodies, by h.
+    subroutine columns_of_body_at_time(body, h, m1, m2, m3, q0, q1, q2, q3, stat)
+        type(rigid_body), intent(in) :: body
+        real(wp), intent(in) :: h
+        real(wp), intent(inout), contiguous :: m1(:), m2(:), m3(:)
+        real(wp), intent(inout), contiguous, optional :: q0(:), q1(:), q2(:), q3(:)
+        integer, intent(out), optional :: stat
+
+        call columns([core_of(body)], [h], size(m1), m1, m2, m3, stat, q0, q1, q2, q3)
+    end subroutine columns_of_body_at_time
+
+    !> The columns of n equal bodies, by the times h(n).
+    subroutine columns_of_body_at_times(body, h, m1, m2, m3, q0, q1, q2, q3, stat)
+        type(rigid_body), intent(in) :: body
+        real(wp), intent(in) :: h(:)
+        real(wp), intent(inout), contiguous :: m1(:), m2(:), m3(:)
+        real(wp), intent(inout), contiguous, optional :: q0(:), q1(:), q2(:), q3(:)
+        integer, intent(out), optional :: stat
+
+        call columns([core_of(body)], h, size(h), m1, m2, m3, stat, q0, q1, q2, q3)
+    end subroutine columns_of_body_at_times
+
+    !> The columns of the n bodies body(n), by h.
+    subroutine columns_of_bodies_at_time(body, h, m1, m2, m3, q0, q1, q2, q3, stat)
+        type(rigid_body), intent(in), target :: body(:)
+        real(wp), intent(in) :: h
+        real(wp), intent(inout), contiguous :: m1(:), m2(:), m3(:)
+        real(wp), intent(inout), contiguous, optional :: q0(:), q1(:), q2(:), q3(:)
+        integer, intent(out), optional :: stat
+
+        call columns(cores_of(body), [h], size(body), m1, m2, m3, stat, q0, q1, q2, q3)
+    end subroutine columns_of_bodies_at_time
+
+    !> The columns of the n bodies body(n), by the times h(n).
+    subroutine columns_of_bodies_at_times(body, h, m1, m2, m3, q0, q1, q2, q3, stat)
+        type(rigid_body), intent(in), target :: body(:)
+        real(wp), intent(in) :: h(:)
+        real(wp), intent(inout), contiguous :: m1(:), m2(:), m3(:)
+        real(wp), intent(inout), contiguous, optional :: q0(:), q1(:), q2(:), q3(:)
+        integer, intent(out), optional :: stat
+
+        call columns(cores_of(body), h, size(body), m1, m2, m3, stat, q0, q1, q2, q3)
+    end subroutine columns_of_bodies_at_times
+
+    !> n states in rows of m, and of q when present.
+    subroutine rows(core, h, n, m, stat, q)
+        type(body_core), intent(in), contiguous :: core(:)
+        real(wp), intent(in), contiguous :: h(:)
+        integer, intent(in) :: n
+        real(wp), intent(inout), contiguous :: m(:, :)
+        integer, intent(out), optional :: stat
+        real(wp), intent(inout), contiguous, optional :: q(:, :)
+        integer :: code
+
+        code = status_bad_count
+        if (match(core, h, n) .and. size(m, 1) == 3 .and. size(m, 2) == n) then
+            if (.not. present(q)) then
+                call flow_many(core, size(core), h, size(h), n, m, code)
+            else if (size(q, 1) == 4 .and. size(q, 2) == n) then
+                call flow_many(core, size(core), h, size(h), n, m, code, q)
+            end if
+        end if
+        call conclude(code, 'free_flow', stat)
+    end subroutine rows
+
+    !> n states with matrices: the turns of a chunk as quaternions, then the matrices by them. A matrix that
+    !> is not finite is refused as a quaternion of norm zero is.
+    subroutine matrices(core, h, n, m, a, stat)
+        type(body_core), intent(in), contiguous :: core(:)
+        real(wp), intent(in), contiguous :: h(:)
+        integer, intent(in) :: n
+        real(wp), intent(inout), contiguous :: m(:, :), a(:, :, :)
+        integer, intent(out), optional :: stat
+        real(wp) :: q(4, chunk)
+        integer :: code, one, first, count, b, t, i
+
+        code = status_bad_count
+        if (match(core, h, n) .and. size(m, 1) == 3 .and. size(m, 2) == n .and. size(a, 1) == 3 &
+            .and. size(a, 2) == 3 .and. size(a, 3) == n) then
+            code = status_ok
+            !$omp parallel do if (n >= 64*chunk) private(q, count, b, t, i, one) reduction(max: code)
+            do first = 1, n, chunk
+                count = min(chunk, n - first + 1)
+                b = merge(count, 1, size(core) > 1)
+                t = merge(count, 1, size(h) > 1)
+                do i = 1, count
+                    q(:, i) = 0.0_wp
+                    if (all(ieee_is_finite(a(:, :, first + i - 1)))) q(1, i) = 1.0_wp
+                end do
+                associate (c => merge(first, 1, b > 1), s => merge(first, 1, t > 1))
+                    call flow_many(core(c:c + b - 1), b, h(s:s + t - 1), t, count, &
+                                   m(:, first:first + count - 1), one, q)
+                end associate
+                code = max(code, one)
+                do i = 1, count
+                    if (any(abs(q(2:4, i)) > 0.0_wp)) call turn_matrix(q(:, i), a(:, :, first + i - 1))
+                end do
+            end do
+            !$omp end parallel do
+        end if
+        call conclude(code, 'free_flow', stat)
+    end subroutine matrices
+
+    !> n states in columns.
+    subroutine columns(core, h, n, m1, m2, m3, stat, q0, q1, q2, q3)
+        type(body_core), intent(in), contiguous :: core(:)
+        real(wp), intent(in), contiguous :: h(:)
+        integer, intent(in) :: n
+        real(wp), intent(inout), contiguous :: m1(:), m2(:), m3(:)
+        integer, intent(out), optional :: stat
+        real(wp), intent(inout), contiguous, optional :: q0(:), q1(:), q2(:), q3(:)
+        integer :: code
+
+        code = status_bad_count
+        if (match(core, h, n) .and. all([size(m1), size(m2), size(m3)] == n)) then
+            if (present(q0) .and. present(q1) .and. present(q2) .and. present(q3)) then
+                if (all([size(q0), size(q1), size(q2), size(q3)] == n)) then
+                    call flow_columns(core, size(core), h, size(h), n, m1, m2, m3, code, q0, q1, q2, q3)
+                end if
+            else if (.not. (present(q0) .or. present(q1) .or. present(q2) .or. present(q3))) then
+                call flow_columns(core, size(core), h, size(h), n, m1, m2, m3, code)
+            end if
+        end if
+        call conclude(code, 'free_flow_columns', stat)
+    end subroutine columns
+
+    !> Whether there is one body or n, and one time or n.
+    pure function match(core, h, n) result(yes)
+        type(body_core), intent(in) :: core(:)
+        real(wp), intent(in) :: h(:)
+        integer, intent(in) :: n
+        logical :: yes
+
+        yes = (size(core) == 1 .or. size(core) == n) .and. (size(h) == 1 .or. size(h) == n)
+    end function match
+
+end module frb_free_flow_many
