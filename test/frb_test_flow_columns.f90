@@ -230,7 +230,7 @@ contains
     subroutine check_refused(t, some)
         type(tally), intent(inout) :: t
         type(sample), intent(in) :: some
-        type(sample) :: bad
+        type(sample), allocatable :: bad
         real(wp) :: m(3, n), q(4, n), good_m(3, n), good_q(4, n)
         logical :: right
         integer :: kind, stat, i, expected

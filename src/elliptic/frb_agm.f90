@@ -27,6 +27,7 @@ module frb_agm
     integer, parameter :: most_steps = 16
 
     !> Once c = (a - b)/(a + b) is below this, the rest of the transformation is a short series in c.
+    integer, parameter :: most_means = 64       !! a bound for NaN, where compilers assume there is none
     real(wp), parameter :: series_radius = 1.0e-4_wp
 
     !> The same for the mean alone, which is even in c: the first term left out is 11 c**6/256.
@@ -65,6 +66,7 @@ contains
         real(wp) :: value
         real(wp) :: complement, a, b, next
         logical :: valid
+        integer :: n
 
         call complement_of(k, kc2, complement, valid)
         if (.not. valid) then
@@ -74,7 +76,8 @@ contains
         else
             a = 1.0_wp
             b = sqrt(complement)
-            do while (abs(a - b) > mean_radius*(a + b))
+            do n = 1, most_means
+                if (abs(a - b) <= mean_radius*(a + b)) exit
                 next = 0.5_wp*(a + b)
                 b = sqrt(a*b)
                 a = next

@@ -22,6 +22,8 @@ module frb_carlson
     public :: rf, rc, rj, rd, rf_and_rj
 
     !> Largest relative distance from the mean at which the series are good to a quarter of an ulp.
+    !> A bound for NaN, where a compiler assumes that there is none.
+    integer, parameter :: most_duplications = 4096
     real(wp), parameter :: rf_radius = 0.055_wp
     real(wp), parameter :: rj_radius = 0.020_wp
 
@@ -155,10 +157,12 @@ contains
     pure subroutine rf_duplications(x, y, z)
         real(wp), intent(inout) :: x, y, z
         real(wp) :: sx, sy, sz, lambda, mean, distance
+        integer :: n
 
         mean = (x + y + z)/3
         distance = max(abs(mean - x), abs(mean - y), abs(mean - z))/rf_radius
-        do while (distance > mean)
+        do n = 1, most_duplications
+            if (distance <= mean) exit
             sx = sqrt(x)
             sy = sqrt(y)
             sz = sqrt(z)
@@ -274,13 +278,15 @@ contains
         real(wp), intent(inout) :: x, y, z, p
         real(wp), intent(out) :: total, quarter
         real(wp) :: sx, sy, sz, sp, lambda, mean, distance, d, inverse, delta, e
+        integer :: n
 
         total = 0.0_wp
         quarter = 1.0_wp
         mean = 0.2_wp*(x + y + z + 2*p)
         distance = max(abs(mean - x), abs(mean - y), abs(mean - z), abs(mean - p))/rj_radius
         delta = (p - x)*(p - y)*(p - z)
-        do while (distance > mean)
+        do n = 1, most_duplications
+            if (distance <= mean) exit
             sx = sqrt(x)
             sy = sqrt(y)
             sz = sqrt(z)

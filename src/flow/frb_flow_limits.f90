@@ -5,9 +5,12 @@ module frb_flow_limits
     implicit none
     private
 
+    public :: most_halvings
     public :: short_limit, tiny_limit, tiny_turn_limit, small_turn_limit, middle_limit, middle_turn_limit
     public :: square_limit, period_limit, smallest_denominator, sin_cos_limit, plain_largest, plain_smallest
 
+    !> A bound for NaN, where a compiler assumes that there is none: 10 are needed after settled times.
+    integer, parameter :: most_halvings = 16
     real(wp), parameter :: short_limit = 0.002_wp       !! largest max(P, R) (h/2)^2 of the short series
     real(wp), parameter :: tiny_limit = 1.0e-4_wp       !! the same of the first terms alone
     real(wp), parameter :: tiny_turn_limit = 1.0e-3_wp  !! largest square of a half angle of the first terms

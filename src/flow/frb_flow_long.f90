@@ -1,7 +1,8 @@
 !> Steps of one body beyond the series of frb_flow_one: s^2 by its series at a fraction of the time and
 !> doublings, many periods by the arithmetic-geometric mean.
 module frb_flow_long
-    use frb_flow_limits, only: middle_limit, square_limit, period_limit, smallest_denominator, sin_cos_limit
+    use frb_flow_limits, only: most_halvings, middle_limit, square_limit, period_limit, &
+        smallest_denominator, sin_cos_limit
     use frb_inertia, only: body_core
     use frb_kinds, only: wp, pi
     implicit none
@@ -47,15 +48,13 @@ contains
         if (many_periods) call reduce_periods(pmax, delta, nu, with_attitude, fraction, turned, whole)
         ! Down to a part of the time that the series reach, by as many halvings as there are doublings.
         span = fraction*fraction
-        triples = 0
-        do while (pmax*span > square_limit)
+        do triples = 0, most_halvings - 1
+            if (pmax*span <= square_limit) exit
             span = 0.25_wp*span
-            triples = triples + 1
         end do
-        squares = 0
-        do while (pmax*span > middle_limit)       ! nu <= pmax
+        do squares = 0, most_halvings - 1
+            if (pmax*span <= middle_limit) exit     ! nu <= pmax
             span = 0.25_wp*span
-            squares = squares + 1
         end do
         call middle_series((p + r)*span, p*r*(span*span), y, s)
         y = y*span

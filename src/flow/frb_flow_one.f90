@@ -43,12 +43,13 @@ contains
 
     !> Advances m, and q when present, by h. `body` has status_ok and its own axes are principal.
     !> code: status_ok, or why the input was refused (it is then untouched).
-    pure recursive subroutine flow_one(body, h, m, code, q)
+    pure recursive subroutine flow_one(body, h, m, code, q, scaled)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: h
         real(wp), intent(inout) :: m(3)
         integer, intent(out) :: code
         real(wp), intent(inout), optional :: q(4)
+        logical, intent(in), optional :: scaled     !! present: by flow_rescaled, which is not called again
         real(wp) :: t, a, b, g, m1, m2, m3, gg, p, r, nu_first, nu_mirror, rate
         real(wp) :: y, scd, u, w, k, a23, b31, g12, d1, d2, d3
         real(wp) :: nu, v0, v1, v2, v3, angle, twist, cosm1, along, dot, square, change, w0, w1, w2, w3, q3
@@ -77,13 +78,14 @@ contains
             plain = abs(rate) < plain_largest
         end if
         if (.not. plain) then
-            call flow_rescaled(body, h, m, code, q)
+            code = status_bad_momentum
+            if (.not. present(scaled)) call flow_rescaled(body, h, m, code, q)
             return
         end if
         code = status_ok
         square = rate*rate*(m1*m1 + m2*m2 + m3*m3)
         if (square > middle_turn_limit) then    ! long whatever the orbit: its constants are formed there
-            if (square <= largest_square_angle) then
+            if (square <= largest_square_angle .or. present(scaled)) then
                 call long_step(body, t, m, q)
             else
                 call flow_rescaled(body, h, m, code, q)
@@ -262,10 +264,10 @@ contains
         if (present(q)) then
             eq = exponent(maxval(abs(q)))
             q = scale(q, -eq)
-            call flow_one(scaled, time, m, code, q)
+            call flow_one(scaled, time, m, code, q, .true.)
             q = scale(q, eq)
         else
-            call flow_one(scaled, time, m, code)
+            call flow_one(scaled, time, m, code, scaled=.true.)
         end if
         m = scale(m, em)
     end subroutine flow_rescaled

@@ -2,7 +2,7 @@
 !> frb_flow_long with two integrals more, D and the one over dn^2; many periods by one arithmetic-geometric
 !> mean.
 module frb_flow_tangent_long
-    use frb_flow_limits, only: middle_limit, square_limit, period_limit, sin_cos_limit
+    use frb_flow_limits, only: most_halvings, middle_limit, square_limit, period_limit, sin_cos_limit
     use frb_flow_tangent_parts, only: step_parts
     use frb_flow_tangent_periods, only: reduce_periods
     use frb_inertia, only: body_core
@@ -123,6 +123,7 @@ contains
         type(step_parts), intent(out) :: f
         type(doubling_state), intent(out) :: it
         real(wp) :: mirror, span
+        integer :: n
 
         call set_constants(body, t, m, f, mirror)
         it%delta = orbit_difference(f%a, f%b, f%g, f%m1, f%m3)
@@ -142,16 +143,16 @@ contains
                                 it%whole_dd, it%whole_own)
         end if
         span = it%fraction*it%fraction
-        it%triples = 0
-        do while (it%pmax*span > square_limit)
+        do n = 0, most_halvings - 1
+            if (it%pmax*span <= square_limit) exit
             span = 0.25_wp*span
-            it%triples = it%triples + 1
         end do
-        it%squares = 0
-        do while (it%pmax*span > middle_limit)      ! nu <= pmax
+        it%triples = n
+        do n = 0, most_halvings - 1
+            if (it%pmax*span <= middle_limit) exit      ! nu <= pmax
             span = 0.25_wp*span
-            it%squares = it%squares + 1
         end do
+        it%squares = n
         it%y = span
     end subroutine set_orbit
 
