@@ -3,7 +3,9 @@ module frb_test_drifts
     use frb_checks, only: tally
     use frb_drifts, only: drift_by_name, flow_drift, matrix_drift, quaternion_drift
     use frb_free_flow, only: rigid_body
+    use frb_invariants, only: kinetic_energy, norm_defect, spatial_momentum
     use frb_kinds, only: wp
+    use frb_rotations, only: quat_to_matrix
     use frb_scenes, only: heavy_top
     use frb_schemes, only: splitting_scheme
     use frb_splitting, only: integrate
@@ -22,8 +24,9 @@ contains
     subroutine test_drifts(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('drifts', 34)
+        call t%open_suite('drifts', 58)
         call test_runs(t)
+        call test_tensors(t)
         call test_names(t)
         call t%close_suite()
     end subroutine test_drifts
@@ -88,6 +91,70 @@ contains
             end if
         end do
     end subroutine test_runs
+
+    !> A body by its tensor keeps what the same body by its moments keeps, with every drift, plain and
+    !> compensated: eight of each, root mean squares of what is lost at the end.
+    subroutine test_tensors(t)
+        type(tally), intent(inout) :: t
+        character(9), parameter :: names(3) = ['free_flow', 'frb_step ', 'quat_step']
+        character(11), parameter :: modes(2) = ['plain      ', 'compensated']
+        character(8), parameter :: kept(4) = ['energy  ', 'momentum', 'norm    ', 'q-m     ']
+        real(wp), parameter :: moments(3) = [0.6_wp, 0.8_wp, 1.0_wp]
+        class(body_drift), allocatable :: drift
+        real(wp) :: r(3, 3), m0(3), lost(4, 2), x(4)
+        integer :: i, k, mode
+
+        do k = 1, size(names)
+            call drift_by_name(trim(names(k)), drift)
+            do mode = 1, 2
+                lost = 0.0_wp
+                do i = 1, 8
+                    x = [1.0_wp, sin(10.0_wp*i), cos(17.0_wp*i), sin(23.0_wp*i)]
+                    r = quat_to_matrix(x/norm2(x))
+                    m0 = (1 + 0.01_wp*i)*[1.8_wp, 0.4_wp, -0.9_wp]
+                    lost(:, 1) = lost(:, 1) + lost_by(rigid_body(moments), m0, drift, mode == 2)**2
+                    lost(:, 2) = lost(:, 2) + lost_by(rigid_body(turned_tensor(r)), matmul(r, m0), drift, &
+                                                      mode == 2)**2
+                end do
+                lost = sqrt(lost/8)
+                do i = 1, 4
+                    call t%at_most(trim(names(k))//'-'//trim(modes(mode))//'-of-a-tensor-keeps-the-'// &
+                                   trim(kept(i))//'-as-of-its-moments', lost(i, 2), 3*lost(i, 1) + 2*eps)
+                end do
+            end do
+        end do
+
+    contains
+
+        !> R diag(moments) R^T, symmetric to the last bit.
+        pure function turned_tensor(r) result(tensor)
+            real(wp), intent(in) :: r(3, 3)
+            real(wp) :: tensor(3, 3)
+
+            tensor = matmul(r*spread(moments, 1, 3), transpose(r))
+            tensor = (tensor + transpose(tensor))/2
+        end function turned_tensor
+
+        !> Relative change of energy and |m|, |q| - 1, and the change of Q m, in 8000 steps without torque.
+        function lost_by(body, m0, drift, compensated) result(lost)
+            type(rigid_body), intent(in) :: body
+            real(wp), intent(in) :: m0(3)
+            class(body_drift), intent(in) :: drift
+            logical, intent(in) :: compensated
+            real(wp) :: lost(4)
+            type(heavy_top) :: weightless
+            real(wp) :: m(3), q(4)
+
+            weightless%force = 0.0_wp
+            m = m0
+            q = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+            call integrate(body, splitting_scheme('strang'), weightless, 0.5_wp, 8000, m, q, drift=drift, &
+                           compensated=compensated)
+            lost = [kinetic_energy(body, m)/kinetic_energy(body, m0) - 1, norm2(m)/norm2(m0) - 1, &
+                    norm_defect(q), norm2(spatial_momentum(m, q) - m0)/norm2(m0)]
+        end function lost_by
+
+    end subroutine test_tensors
 
     !> Names known and refused.
     subroutine test_names(t)

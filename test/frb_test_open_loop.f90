@@ -125,8 +125,7 @@ contains
             do step = 1, steps
                 do i = 1, plan%stages
                     call free_flow(item%body, plan%drift(i), m_own, q_own)
-                    known = known .and. i == 1 .and. .not. abs(plan%drift(i)) > 0.0_wp
-                    if (.not. known) then
+                    if (abs(plan%drift(i)) > 0.0_wp .or. .not. known) then
                         call item%top%torque(q_own, (step - 1)*h + plan%time(i), tau, stat)
                         asked = asked + 1
                     end if

@@ -16,7 +16,7 @@ module frb_flow_one
     implicit none
     private
 
-    public :: flow_body, flow_one
+    public :: flow_body, flow_one, turn_back
 
     !> How far a step reaches: which series it takes.
     integer, parameter :: tiny_step = 1, short_step = 2, middle_step = 3
@@ -181,7 +181,7 @@ contains
         real(wp), intent(inout) :: m(3)
         integer, intent(out) :: code
         real(wp), intent(inout), optional :: q(4)
-        real(wp) :: n(3), old(3), upright(3), change(4), w(3), w0, size_q
+        real(wp) :: n(3), old(3), upright(3), change(4), size_q
 
         code = status_bad_momentum
         if (.not. all(ieee_is_finite(m))) return
@@ -212,16 +212,31 @@ contains
             call flow_one(body, h, n, code)
         end if
         if (code /= status_ok) return
-        m = m + matmul(body%axes, n - old)
-        if (.not. present(q)) return
-        w = matmul(body%axes, change(2:4))
-        w0 = change(1) - 1
-        if (change(1) > 0.5_wp) w0 = -sum(w*w)/(1 + sqrt(1 - sum(w*w)))
+        if (present(q)) then
+            call turn_back(body, n - old, change, m, q)
+        else
+            m = m + matmul(body%axes, n - old)
+        end if
+    end subroutine flow_in_principal_axes
+
+    !> Adds a change of the momentum and a turn of norm one, both in principal axes, to m and q in those of
+    !> the body: as increments, so that rounding does not gather in what stays as it is.
+    pure subroutine turn_back(body, change, turn, m, q)
+        type(body_core), intent(in) :: body
+        real(wp), intent(in) :: change(3)
+        real(wp), intent(in) :: turn(4)
+        real(wp), intent(inout) :: m(3), q(4)
+        real(wp) :: w(3), w0
+
+        m = m + matmul(body%axes, change)
+        w = matmul(body%axes, turn(2:4))
+        w0 = turn(1) - 1
+        if (turn(1) > 0.5_wp) w0 = -sum(w*w)/(1 + sqrt(1 - sum(w*w)))
         q = q + [q(1)*w0 - (q(2)*w(1) + q(3)*w(2) + q(4)*w(3)), &
                  q(1)*w(1) + q(2)*w0 + (q(3)*w(3) - q(4)*w(2)), &
                  q(1)*w(2) + q(3)*w0 + (q(4)*w(1) - q(2)*w(3)), &
                  q(1)*w(3) + q(4)*w0 + (q(2)*w(2) - q(3)*w(1))]
-    end subroutine flow_in_principal_axes
+    end subroutine turn_back
 
     !> The same flow with momentum, moments and time scaled by powers of 2 to the middle of the exponents; a
     !> time so long that no digit of any phase is left is cut to where the arithmetic holds.

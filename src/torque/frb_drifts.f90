@@ -1,12 +1,13 @@
 !> Drifts by name, to be compared in the same loop: the free flow and the paper's two steps, exact or
 !> semi-exact.
 module frb_drifts
+    use frb_flow_one, only: turn_back
     use frb_free_flow, only: core_of, free_flow, rigid_body
     use frb_inertia, only: body_core
     use frb_kinds, only: wp, most_points
     use frb_matrix_step, only: frb_step
     use frb_quat_step, only: quat_step
-    use frb_rotations, only: matrix_to_quat, quat_conjugate, quat_product, quat_rotate
+    use frb_rotations, only: matrix_to_quat, quat_product
     use frb_status, only: conclude, status_ok, status_bad_option
     use frb_torque, only: body_drift
     implicit none
@@ -98,48 +99,48 @@ contains
         integer, intent(out) :: stat
         real(wp), parameter :: identity(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, &
                                                          0.0_wp, 0.0_wp, 1.0_wp], [3, 3])
-        real(wp) :: turn(3, 3), m_new(3)
+        type(body_core) :: core
+        real(wp) :: turn(3, 3), old(3), n(3)
 
-        call to_principal(core_of(body), m, q)
-        m_new = m
+        core = core_of(body)
+        stat = core%status
+        if (stat /= status_ok) return
+        old = m
+        if (core%needs_rotation) old = matmul(m, core%axes)
+        n = old
         turn = identity
-        call frb_step(m_new, turn, h, body%moments(), m, identity, self%points, stat)
-        m = m_new
-        q = quat_product(q, matrix_to_quat(turn))
-        call from_principal(core_of(body), m, q)
+        call frb_step(n, turn, h, core%moments, old, identity, self%points, stat)
+        if (stat /= status_ok) return
+        if (core%needs_rotation) then
+            call turn_back(core, n - old, matrix_to_quat(turn), m, q)
+        else
+            m = n
+            q = quat_product(q, matrix_to_quat(turn))
+        end if
     end subroutine advance_by_matrix
 
-    !> The step of the quaternion, in principal axes.
+    !> q goes along, or the turn alone where it is needed in other axes.
     subroutine advance_by_quaternion(self, body, h, m, q, stat)
         class(quaternion_drift), intent(in) :: self
         type(rigid_body), intent(in) :: body
         real(wp), intent(in) :: h
         real(wp), intent(inout) :: m(3), q(4)
         integer, intent(out) :: stat
+        type(body_core) :: core
+        real(wp) :: turn(4), old(3), n(3)
 
-        call to_principal(core_of(body), m, q)
-        call quat_step(m, q, h, body%moments(), m, q, self%points, self%frame, stat)
-        call from_principal(core_of(body), m, q)
+        core = core_of(body)
+        stat = core%status
+        if (stat /= status_ok) return
+        if (core%needs_rotation) then
+            old = matmul(m, core%axes)
+            n = old
+            turn = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+            call quat_step(n, turn, h, core%moments, old, turn, self%points, self%frame, stat)
+            if (stat == status_ok) call turn_back(core, n - old, turn, m, q)
+        else
+            call quat_step(m, q, h, core%moments, m, q, self%points, self%frame, stat)
+        end if
     end subroutine advance_by_quaternion
-
-    !> From the axes of a tensor to principal axes.
-    pure subroutine to_principal(body, m, q)
-        type(body_core), intent(in) :: body
-        real(wp), intent(inout) :: m(3), q(4)
-
-        if (.not. body%needs_rotation) return
-        m = quat_rotate(quat_conjugate(body%axes_q), m)
-        q = quat_product(q, body%axes_q)
-    end subroutine to_principal
-
-    !> And back.
-    pure subroutine from_principal(body, m, q)
-        type(body_core), intent(in) :: body
-        real(wp), intent(inout) :: m(3), q(4)
-
-        if (.not. body%needs_rotation) return
-        m = quat_rotate(body%axes_q, m)
-        q = quat_product(q, quat_conjugate(body%axes_q))
-    end subroutine from_principal
 
 end module frb_drifts

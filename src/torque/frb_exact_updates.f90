@@ -54,7 +54,8 @@ contains
         real(wp), intent(in) :: r(4)
         real(wp), intent(inout) :: m(3), m_rest(3), q(4), q_rest(4)
         real(wp) :: w, rr, c1, c2, c3, q0, q1, q2, q3, m1, m2, m3, cut
-        real(wp) :: change(3), high(3), low(3)
+        real(wp) :: change(3), high(6), low(6)
+        integer :: i, j, k
 
         rr = r(2)*r(2) + r(3)*r(3) + r(4)*r(4)
         w = r(1) - 1
@@ -88,6 +89,14 @@ contains
         call square_change(m1, m_rest(1), change(1), cut, high(1), low(1))
         call square_change(m2, m_rest(2), change(2), cut, high(2), low(2))
         call square_change(m3, m_rest(3), change(3), cut, high(3), low(3))
+        if (body%needs_rotation) then
+            do k = 1, 3
+                i = 1 + mod(k, 3)
+                j = 1 + mod(i, 3)
+                call product_change(m(i), m_rest(i), change(i), m(j), m_rest(j), change(j), cut, &
+                                    high(3 + k), low(3 + k))
+            end do
+        end if
         call add(m(1), m_rest(1), change(1))
         call add(m(2), m_rest(2), change(2))
         call add(m(3), m_rest(3), change(3))
@@ -115,28 +124,71 @@ contains
         low = d*t + e*(s + t)
     end subroutine square_change
 
+    !> (m + change)(n + change_n) - (m + rest)(n + rest_n) = high + low, high exact.
+    pure subroutine product_change(m, rest, change, n, rest_n, change_n, cut, high, low)
+        real(wp), intent(in) :: m, rest, change, n, rest_n, change_n, cut
+        real(wp), intent(out) :: high, low
+        real(wp) :: a, b, d, e, a_n, b_n, d_n, e_n
+
+        a = (m + cut) - cut
+        b = (m - a) + rest
+        d = (change + cut) - cut
+        e = (change - d) - rest
+        a_n = (n + cut) - cut
+        b_n = (n - a_n) + rest_n
+        d_n = (change_n + cut) - cut
+        e_n = (change_n - d_n) - rest_n
+        high = d*a_n + d_n*(a + d)
+        low = (e_n*(a + d) + e*(a_n + d_n + e_n)) + (b*(d_n + e_n) + b_n*(d + e))
+    end subroutine product_change
+
     !> Takes back what rounding did to |m|, by a change along m, and to the kinetic energy, by a turn v of m
     !> and q, of a few units of the last digit of the drift's turn; rr is the square of the vector of that,
-    !> high + low are the changes of the squares of m. Where a drift does not keep the energy to rounding it
-    !> is left as it is, and so it is for a body given by a tensor.
+    !> high + low are the changes of the squares of m, and of m2 m3, m3 m1, m1 m2 for a body that needs them.
+    !> Where a drift does not keep the energy to rounding it is left as it is.
     !>
     !> The motion magnifies these two errors in proportion to the time, and under a weak torque no others.
-    !> In sorted axes 2 T is beta m1^2 + alpha m2^2 but for what |m| gives.
+    !> 2 T is m . K m but for what |m| gives, in sorted axes beta m1^2 + alpha m2^2; k is K m x m.
     pure subroutine keep_norm_and_energy(body, rr, high, low, m, m_rest, q, q_rest)
         type(body_core), intent(in) :: body
-        real(wp), intent(in) :: rr, high(3), low(3), m(3), q(4)
+        real(wp), intent(in) :: rr, high(6), low(6), m(3), q(4)
         real(wp), intent(inout) :: m_rest(3), q_rest(4)
         real(wp), parameter :: limit = (32*epsilon(1.0_wp))**2
-        real(wp) :: alpha, beta, c, part1, part2, stretch, half, defect
-        real(wp) :: k1, k2, k3, kk, m1, m2, m3, v1, v2, v3, v(3)
-        integer :: i1, i2, i3
+        real(wp) :: stretch, half, defect, kk, v1, v2, v3, k(3)
 
         half = -0.5_wp/(m(1)*m(1) + m(2)*m(2) + m(3)*m(3))
         stretch = half*((high(1) + high(2) + high(3)) + (low(1) + low(2) + low(3)))
         m_rest(1) = m_rest(1) + stretch*m(1)
         m_rest(2) = m_rest(2) + stretch*m(2)
         m_rest(3) = m_rest(3) + stretch*m(3)
-        if (body%needs_rotation .or. body%beta < 1.0e-20_wp .or. body%beta > 1.0e20_wp) return
+        if (body%beta < 1.0e-20_wp .or. body%beta > 1.0e20_wp) return
+        if (body%needs_rotation) then
+            call turned_defect(body, stretch, high, low, m, defect, k)
+        else
+            call sorted_defect(body, stretch, high(1:3), low(1:3), m, defect, k)
+        end if
+        kk = k(1)*k(1) + k(2)*k(2) + k(3)*k(3)
+        if (.not. defect*defect < limit*rr*kk) return
+        defect = (-0.25_wp/kk)*defect
+        v1 = defect*k(1)
+        v2 = defect*k(2)
+        v3 = defect*k(3)
+        m_rest(1) = m_rest(1) - 2*(v2*m(3) - v3*m(2))
+        m_rest(2) = m_rest(2) - 2*(v3*m(1) - v1*m(3))
+        m_rest(3) = m_rest(3) - 2*(v1*m(2) - v2*m(1))
+        q_rest(1) = q_rest(1) - (q(2)*v1 + q(3)*v2 + q(4)*v3)
+        q_rest(2) = q_rest(2) + (q(1)*v1 + q(3)*v3 - q(4)*v2)
+        q_rest(3) = q_rest(3) + (q(1)*v2 + q(4)*v1 - q(2)*v3)
+        q_rest(4) = q_rest(4) + (q(1)*v3 + q(2)*v2 - q(3)*v1)
+    end subroutine keep_norm_and_energy
+
+    !> The change of m . K m, once |m| is taken back by `stretch`, and k, in principal axes.
+    pure subroutine sorted_defect(body, stretch, high, low, m, defect, k)
+        type(body_core), intent(in) :: body
+        real(wp), intent(in) :: stretch, high(3), low(3), m(3)
+        real(wp), intent(out) :: defect, k(3)
+        real(wp) :: alpha, beta, c, part1, part2, m1, m2, m3
+        integer :: i1, i2, i3
 
         i1 = body%order(1)
         i2 = body%order(2)
@@ -144,10 +196,9 @@ contains
         m1 = m(i1)
         m2 = m(i2)
         m3 = body%parity*m(i3)
-        k1 = body%alpha*(m2*m3)
-        k2 = -body%beta*(m3*m1)
-        k3 = body%gamma*(m1*m2)
-        kk = k1*k1 + k2*k2 + k3*k3
+        k(i1) = body%alpha*(m2*m3)
+        k(i2) = -body%beta*(m3*m1)
+        k(i3) = body%parity*(body%gamma*(m1*m2))
         c = shift*body%beta
         beta = (body%beta + c) - c
         alpha = (body%alpha + c) - c
@@ -158,22 +209,28 @@ contains
                  + (body%beta*((high(i1) - part1) + low(i1)) + body%alpha*((high(i2) - part2) + low(i2))) &
                  + (((body%beta - beta)*part1 + (body%alpha - alpha)*part2) &
                     + (2*stretch)*(body%beta*(m1*m1) + body%alpha*(m2*m2)))
-        if (.not. defect*defect < limit*rr*kk) return
-        defect = (-0.25_wp/kk)*defect
-        v(i1) = defect*k1
-        v(i2) = defect*k2
-        v(i3) = body%parity*(defect*k3)
-        v1 = v(1)
-        v2 = v(2)
-        v3 = v(3)
-        m_rest(1) = m_rest(1) - 2*(v2*m(3) - v3*m(2))
-        m_rest(2) = m_rest(2) - 2*(v3*m(1) - v1*m(3))
-        m_rest(3) = m_rest(3) - 2*(v1*m(2) - v2*m(1))
-        q_rest(1) = q_rest(1) - (q(2)*v1 + q(3)*v2 + q(4)*v3)
-        q_rest(2) = q_rest(2) + (q(1)*v1 + q(3)*v3 - q(4)*v2)
-        q_rest(3) = q_rest(3) + (q(1)*v2 + q(4)*v1 - q(2)*v3)
-        q_rest(4) = q_rest(4) + (q(1)*v3 + q(2)*v2 - q(3)*v1)
-    end subroutine keep_norm_and_energy
+    end subroutine sorted_defect
+
+    !> The same for a body given by a tensor, in its axes: K has six elements, products of m go with it.
+    pure subroutine turned_defect(body, stretch, high, low, m, defect, k)
+        type(body_core), intent(in) :: body
+        real(wp), intent(in) :: stretch, high(6), low(6), m(3)
+        real(wp), intent(out) :: defect, k(3)
+        real(wp) :: form(3, 3), all_of_it(6), main(6), part(6), c, u(3), v(3), n(3)
+
+        u = body%axes(:, body%order(1))
+        v = body%axes(:, body%order(2))
+        form = body%beta*spread(u, 1, 3)*spread(u, 2, 3) + body%alpha*spread(v, 1, 3)*spread(v, 2, 3)
+        n = matmul(form, m)
+        k = [n(2)*m(3) - n(3)*m(2), n(3)*m(1) - n(1)*m(3), n(1)*m(2) - n(2)*m(1)]
+        all_of_it = [form(1, 1), form(2, 2), form(3, 3), 2*form(2, 3), 2*form(3, 1), 2*form(1, 2)]
+        c = shift*body%beta
+        main = (all_of_it + c) - c
+        c = shift*maxval(abs(high))
+        part = (high + c) - c
+        defect = sum(main*part) + (sum(all_of_it*((high - part) + low)) + (sum((all_of_it - main)*part) &
+                                                                           + (2*stretch)*dot_product(n, m)))
+    end subroutine turned_defect
 
     !> x + change, and in rest what x then lacks (Knuth).
     pure subroutine add(x, rest, change)

@@ -114,7 +114,7 @@ contains
 
         call run%scene%torques(run%q, time, run%tau, code)
         if (code == status_ok) then
-            if (.not. all_below(run%tau, run%basis%largest_torque)) code = status_bad_torque
+            if (.not. all_within(size(run%tau), run%tau, run%basis%largest_torque)) code = status_bad_torque
         end if
     end subroutine ask_torque
 
@@ -173,8 +173,8 @@ contains
                 run%g(:, i) = gradient_torque(run%n(:, i), run%tau(:, i), run%g(:, i))
             end if
         end do
-        if (.not. (all_below(run%tau, run%basis%largest_torque) &
-                   .and. all_below(run%g, run%basis%largest_gradient))) code = status_bad_torque
+        if (.not. (all_within(size(run%tau), run%tau, run%basis%largest_torque) &
+                   .and. all_within(size(run%g), run%g, run%basis%largest_gradient))) code = status_bad_torque
     end subroutine ask_gradient
 
     !> The attitudes turned by `reach` times n.
@@ -187,24 +187,6 @@ contains
             run%q_turned(:, i) = turned(run%q(:, i), reach*run%n(:, i))
         end do
     end subroutine turn_all
-
-    !> Whether the sizes of the three numbers of each column add up to less than `bound`; a NaN or Inf shows
-    !> in the sum, which is compared only when there is none.
-    pure function all_below(v, bound) result(good)
-        real(wp), contiguous, intent(in) :: v(:, :)
-        real(wp), intent(in) :: bound
-        logical :: good
-        real(wp) :: total
-        integer :: i
-
-        good = .true.
-        do i = 1, size(v, 2)
-            total = 0.25_wp*abs(v(1, i)) + 0.25_wp*abs(v(2, i)) + 0.25_wp*abs(v(3, i))
-            good = ieee_is_finite(total)
-            if (good) good = total <= 0.25_wp*bound
-            if (.not. good) return
-        end do
-    end function all_below
 
     !> The free bodies for a time h.
     subroutine advance(run, h, code)

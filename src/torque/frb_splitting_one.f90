@@ -103,7 +103,7 @@ contains
 
         call run%scene%torque(run%q, time, run%tau, code)
         if (code == status_ok) then
-            if (.not. all_below(run%tau, run%basis%largest_torque)) code = status_bad_torque
+            if (.not. all_within(3, run%tau, run%basis%largest_torque)) code = status_bad_torque
         end if
     end subroutine ask_torque
 
@@ -155,21 +155,9 @@ contains
         else
             run%g = gradient_torque(n, run%tau, change)
         end if
-        if (.not. (all_below(run%tau, run%basis%largest_torque) &
-                   .and. all_below(run%g, run%basis%largest_gradient))) code = status_bad_torque
+        if (.not. (all_within(3, run%tau, run%basis%largest_torque) &
+                   .and. all_within(3, run%g, run%basis%largest_gradient))) code = status_bad_torque
     end subroutine ask_gradient
-
-    !> Whether the sizes of three numbers add up to less than `bound`; a NaN or Inf shows in the sum, which is
-    !> compared only when there is none.
-    pure function all_below(v, bound) result(good)
-        real(wp), intent(in) :: v(3), bound
-        logical :: good
-        real(wp) :: total
-
-        total = 0.25_wp*abs(v(1)) + 0.25_wp*abs(v(2)) + 0.25_wp*abs(v(3))
-        good = ieee_is_finite(total)
-        if (good) good = total <= 0.25_wp*bound
-    end function all_below
 
     !> The free body for a time h.
     subroutine advance(run, h, code)

@@ -29,8 +29,8 @@ module frb_splitting_plan
     !> zero drift at both ends. Then nothing has moved since the last torque of the step before, and it can be
     !> kept, with `known = .false.` before the first step:
     !>
-    !>     known = known .and. i == 1 .and. .not. abs(plan%drift(i)) > 0
-    !>     if (.not. known) call my_forces(x, q, t + plan%time(i), f, tau);  known = .true.
+    !>     if (abs(plan%drift(i)) > 0 .or. .not. known) call my_forces(x, q, t + plan%time(i), f, tau)
+    !>     known = .true.
     !>
     !> A scheme with modified kicks adds plan%modified(i)*g to m, g = 2 (D_n tau + n x tau) as in
     !> frb_modified_kicks, and 2 D_n f to p; where anything else moves, D_n is the change with q turning by
