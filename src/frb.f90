@@ -28,6 +28,7 @@ module frb
     use frb_splitting, only: integrate
     use frb_extrapolation, only: extrapolate, extrapolation_report
     use frb_splitting_plan, only: splitting_plan
+    use frb_splitting_tangent, only: integrate_tangent
     use frb_invariants, only: kinetic_energy, total_energy, spatial_momentum, norm_defect, invariant_monitor
     implicit none
     public

@@ -44,6 +44,7 @@ program check
     use frb_test_status, only: test_status, stop_in_the_library
     use frb_test_tangent, only: test_tangent
     use frb_test_tangent_laws, only: test_tangent_laws
+    use frb_test_tangent_runs, only: test_tangent_runs
     use frb_test_tangent_duals, only: test_tangent_duals
     implicit none
 
@@ -114,6 +115,7 @@ contains
         call suite(task, 'flow-series', test_flow_series)
         call suite(task, 'tangent', test_tangent)
         call suite(task, 'tangent-laws', test_tangent_laws)
+        call suite(task, 'tangent-runs', test_tangent_runs)
         call suite(task, 'tangent-duals', test_tangent_duals)
         call suite(task, 'published', test_published)
         call suite(task, '--fail', fail)

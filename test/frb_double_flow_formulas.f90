@@ -11,4 +11,6 @@ contains
 
     include '../src/flow/long_formulas.inc'
 
+    include '../src/flow/angle_formulas.inc'
+
 end module frb_double_flow_formulas

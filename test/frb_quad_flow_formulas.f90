@@ -24,6 +24,8 @@ contains
 
     include '../src/flow/long_formulas.inc'
 
+    include '../src/flow/angle_formulas.inc'
+
     include '../src/flow/turn_formulas.inc'
 
     include '../src/flow/join_formulas.inc'

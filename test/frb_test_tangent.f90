@@ -7,6 +7,7 @@ module frb_test_tangent
     use frb_kinds, only: wp
     use frb_reference_cases, only: reference_case, read_cases, score_momentum, score_attitude, median
     use frb_tangent_cases, only: tangent_case, read_tangent_cases, read_tensor_cases, score_matrix
+    use, intrinsic :: ieee_exceptions, only: ieee_overflow, ieee_get_halting_mode, ieee_set_halting_mode
     implicit none
     private
 
@@ -25,7 +26,7 @@ contains
         type(tally), intent(inout) :: t
         type(tangent_case), allocatable :: cases(:)
 
-        call t%open_suite('tangent', 402)
+        call t%open_suite('tangent', 414)
         call read_tangent_cases('data/reference/tangent_cases.txt', cases)
         call check_groups(t, cases, '', 3, 13, .true.)
         call read_tangent_cases('data/reference/tangent_cases_seed500.txt', cases)
@@ -34,6 +35,8 @@ contains
         call check_groups(t, cases, ' (limits)', 3, 11, .false.)
         call read_tensor_cases('data/reference/tangent_tensors.txt', cases)
         call check_groups(t, cases, ' (tensors)', 6, 8, .true.)
+        call check_lanes(t, 'data/reference/tangent_cases.txt', '')
+        call check_lanes(t, 'data/reference/tangent_cases_seed500.txt', ' (seed 500)')
         call check_state(t)
         call t%close_suite()
     end subroutine test_tangent
@@ -68,6 +71,56 @@ contains
         end do
         call t%equal('all-groups-are-there'//label, groups, expected)
     end subroutine check_groups
+
+    !> Cases in lanes, among neighbours of the file: their scores, that they agree with one body at a time,
+    !> and that it does not matter who stands beside them.
+    subroutine check_lanes(t, path, label)
+        type(tally), intent(inout) :: t
+        character(*), intent(in) :: path, label
+        integer, parameter :: n = 70    ! whole blocks and a rest
+        type(tangent_case), allocatable :: cases(:)
+        real(wp) :: m(3, n), q(4, n), transition(6, 6, n), m_one(3), q_one(4), one(6, 6), worst(2), apart, &
+            moved
+        real(wp), allocatable :: score(:, :)
+        integer :: i, j, lane, k
+        logical :: halting
+
+        call read_tangent_cases(path, cases)
+        allocate (score(size(cases), 2))
+        ! A neighbour on the separatrix may go on for so long that its derivative overflows.
+        call ieee_get_halting_mode(ieee_overflow, halting)
+        call ieee_set_halting_mode(ieee_overflow, .false.)
+        apart = 0.0_wp
+        moved = 0.0_wp
+        do i = 1, size(cases)
+            do k = 1, 2
+                lane = 1 + mod(7*i + 29*k, 64)     ! those of the rest go one by one
+                do j = 1, n
+                    m(:, j) = cases(1 + modulo(i - 1 + k*(j - lane), size(cases)))%m0
+                    q(:, j) = no_turn
+                end do
+                call flow_tangent(cases(i)%body, cases(i)%h, m, q, transition)
+                if (k == 1) one = transition(:, :, lane)
+            end do
+            if (norm2(one) < 1.0e100_wp) moved = max(moved, maxval(abs(transition(:, :, lane) - one)))
+            score(i, 1) = score_matrix(transition(1:3, 1:3, lane), cases(i)%jacobian, cases(i)%sensitivity(1))
+            score(i, 2) = score_matrix(transition(4:6, 1:3, lane), cases(i)%turns, cases(i)%sensitivity(2))
+            if (abs(cases(i)%h) <= 0.0_wp) score(i, 2) = maxval(abs(transition(4:6, 1:3, lane)))
+            m_one = cases(i)%m0
+            q_one = no_turn
+            call flow_tangent(cases(i)%body, cases(i)%h, m_one, q_one, one)
+            apart = max(apart, norm2(transition(4:6, 4:6, lane) - one(4:6, 4:6)), norm2(q(:, lane) - q_one), &
+                        maxval(abs(transition(1:3, 4:6, lane))))
+        end do
+        call ieee_set_halting_mode(ieee_overflow, halting)
+        worst = maxval(score, dim=1)
+        call t%at_most('median-of-J-in-lanes'//label, median(score(:, 1)), largest_median)
+        call t%at_most('median-of-W-in-lanes'//label, median(score(:, 2)), largest_median)
+        call t%at_most('score-of-J-in-lanes'//label, worst(1), largest_score)
+        call t%at_most('score-of-W-in-lanes'//label, worst(2), largest_score)
+        call t%at_most('E-and-attitude-in-lanes-are-those-of-one-body'//label, apart, 1.0e-9_wp)
+        call t%at_most('neighbours-change-no-digit'//label, moved, 0.0_wp)
+    end subroutine check_lanes
 
     !> The state against the reference cases of free_flow, with its bars.
     subroutine check_state(t)

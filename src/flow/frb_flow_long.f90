@@ -205,6 +205,8 @@ contains
 
     include 'long_formulas.inc'
 
+    include 'angle_formulas.inc'
+
     include 'join_formulas.inc'
 
 end module frb_flow_long

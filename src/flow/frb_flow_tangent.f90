@@ -23,6 +23,7 @@
 !> Method: closed form; the only integrals besides that of the step are those of s^2, s^2/c^2 and s^2/d^2.
 submodule(frb_free_flow) frb_flow_tangent
     use frb_flow_tangent_body, only: tangent_body
+    use frb_flow_tangent_many, only: tangent_many
     implicit none
 
 contains
@@ -61,5 +62,18 @@ contains
         call tangent_body(body%core, h, m, code, 6, q, transition, by_inertia=by_tensor)
         if (code /= status_ok .or. present(stat)) call conclude(code, 'flow_tangent', stat)
     end procedure tangent_and_tensor
+
+    module procedure tangent_of_states
+        integer :: code
+
+        code = status_bad_count
+        if (size(m, 1) == 3 .and. size(q, 1) == 4 .and. size(q, 2) == size(m, 2) &
+            .and. all(shape(transition) == [6, 6, size(m, 2)])) then
+            call tangent_many(body%core, h, size(m, 2), m, q, transition, code)
+        else
+            transition = 0.0_wp
+        end if
+        call conclude(code, 'flow_tangent', stat)
+    end procedure tangent_of_states
 
 end submodule frb_flow_tangent

@@ -311,6 +311,8 @@ contains
 
     include 'long_formulas.inc'
 
+    include 'angle_formulas.inc'
+
     include 'join_formulas.inc'
 
     include 'tangent_formulas.inc'

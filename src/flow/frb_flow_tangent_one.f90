@@ -120,18 +120,6 @@ contains
         end select
     end subroutine set_series
 
-    !> D, A, B by the first terms of their series, for max(p, r) <= tiny_limit.
-    pure subroutine tiny_integrals(e1, e2, p, r, dd, aa, bb)
-        real(wp), intent(in) :: e1, e2, p, r            !! e1 = p + r, e2 = p r
-        real(wp), intent(out) :: dd, aa, bb
-        real(wp) :: a1
-
-        a1 = 1/5.0_wp - e1*(2/21.0_wp)
-        dd = (1/3.0_wp - e1*(1/15.0_wp)) + ((e1*e1)*(2/315.0_wp) + e2*(1/35.0_wp))
-        aa = dd + p*(a1 + p*(1/7.0_wp))
-        bb = dd + r*(a1 + r*(1/7.0_wp))
-    end subroutine tiny_integrals
-
     !> m at the end of the step.
     pure subroutine advance_momentum(f, m)
         type(step_parts), intent(inout) :: f

@@ -134,6 +134,18 @@ module frb_free_flow
             !> By the elements 11, 22, 33, 12, 13, 23; the last three change both of their places.
             real(wp), intent(out) :: by_tensor(6, 6)
         end subroutine tangent_and_tensor
+
+        !> n equal bodies, in blocks that fill SIMD lanes. A body that is refused keeps its state and the
+        !> others go on; `stat` then tells why (the largest code, if there are several).
+        module subroutine tangent_of_states(body, h, m, q, transition, stat)
+            implicit none
+            type(rigid_body), intent(in) :: body
+            real(wp), intent(in) :: h
+            real(wp), intent(inout), contiguous :: m(:, :)              !! (3, n)
+            real(wp), intent(inout), contiguous :: q(:, :)              !! (4, n)
+            real(wp), intent(out), contiguous :: transition(:, :, :)    !! (6, 6, n)
+            integer, intent(out), optional :: stat
+        end subroutine tangent_of_states
     end interface flow_tangent
 
 contains

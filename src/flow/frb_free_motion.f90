@@ -5,7 +5,7 @@
 !> the start, turned n times; the error of the phase grows with the rounding of T and of the angle alone.
 module frb_free_motion
     use frb_flow_periods, only: quarter_period
-    use frb_free_flow, only: core_of, free_flow, rigid_body
+    use frb_free_flow, only: flow_tangent, core_of, free_flow, rigid_body
     use frb_inertia, only: body_core, keep_off_axis
     use frb_kinds, only: wp, two_pi
     use frb_rotations, only: norm3, quat_product, quat_rotate
@@ -33,6 +33,7 @@ module frb_free_motion
         procedure, private :: at_time    !! state at one time
         procedure, private :: at_times    !! states at n times
         generic :: at => at_time, at_times    !! m, and q when present, at t or t(n)
+        procedure :: tangent    !! derivative of the state at t by that at 0
         procedure :: period    !! period of m
         procedure :: precession    !! turn about the momentum in it [rad]
         procedure :: precession_period    !! mean time of a turn about the momentum
@@ -221,6 +222,27 @@ contains
         end if
         call conclude(code, 'free_motion%at', stat)
     end subroutine at_times
+
+    !> The derivative of the state at t by that at t = 0, on (dm, dtheta) as in `flow_tangent`; 1 where `at`
+    !> would refuse.
+    subroutine tangent(self, t, transition, stat)
+        class(free_motion), intent(in) :: self
+        real(wp), intent(in) :: t                       !! time
+        real(wp), intent(out) :: transition(6, 6)       !! [J 0; W E]
+        integer, intent(out), optional :: stat
+        real(wp) :: m(3), q(4)
+        integer :: code, i
+
+        m = self%m0
+        q = self%q0
+        code = self%status
+        if (code == status_ok) then
+            call flow_tangent(self%body, t, m, q, transition, code)
+        else
+            transition = reshape([(merge(1.0_wp, 0.0_wp, mod(i, 7) == 0), i=0, 35)], [6, 6])
+        end if
+        call conclude(code, 'free_motion%tangent', stat)
+    end subroutine tangent
 
     !> Period of the momentum in the body; on a stable axis that of small oscillations about it; Inf where
     !> there is none (`periodic` is then .false.).

@@ -1,0 +1,139 @@
+!> Derivatives of many steps: products of transitions, runs under torque, a motion at a time.
+module frb_test_tangent_runs
+    use frb_checks, only: tally
+    use frb_flow_samples, only: no_turn, no_rotation
+    use frb_free_flow, only: flow_tangent, rigid_body
+    use frb_free_motion, only: free_motion
+    use frb_kinds, only: wp
+    use frb_rotations, only: quat_conjugate, quat_product
+    use frb_scenes, only: heavy_top
+    use frb_schemes, only: splitting_scheme
+    use frb_splitting, only: integrate
+    use frb_splitting_tangent, only: integrate_tangent
+    use frb_status, only: status_bad_attitude, status_bad_count, status_not_offered
+    implicit none
+    private
+
+    public :: test_tangent_runs
+
+    real(wp), parameter :: eps = epsilon(1.0_wp)
+
+contains
+
+    subroutine test_tangent_runs(t)
+        type(tally), intent(inout) :: t
+
+        call t%open_suite('tangent-runs', 11)
+        call check_composition(t)
+        call check_runs(t)
+        call t%close_suite()
+    end subroutine test_tangent_runs
+
+    !> Matrix of the vector product with v.
+    pure function hat(v) result(x)
+        real(wp), intent(in) :: v(3)
+        real(wp) :: x(3, 3)
+
+        x = reshape([0.0_wp, v(3), -v(2), -v(3), 0.0_wp, v(1), v(2), -v(1), 0.0_wp], [3, 3])
+    end function hat
+
+    !> Om(m) of Phi^T Om(m') Phi = Om(m).
+    pure function structure(m) result(x)
+        real(wp), intent(in) :: m(3)
+        real(wp) :: x(6, 6)
+
+        x = 0.0_wp
+        x(1:3, 4:6) = no_rotation
+        x(4:6, 1:3) = -no_rotation
+        x(4:6, 4:6) = hat(m)
+    end function structure
+
+    !> 1e5 steps of 0.01 against the symplectic structure and one step of 1000.
+    subroutine check_composition(t)
+        type(tally), intent(inout) :: t
+        real(wp), parameter :: m0(3) = [0.5_wp, -0.7_wp, 0.6_wp]
+        type(rigid_body) :: body
+        real(wp) :: m(3), q(4), phi(6, 6), product(6, 6), identity(6, 6), residual
+        integer :: step
+
+        body = rigid_body([0.6_wp, 0.8_wp, 1.0_wp])
+        m = m0
+        q = no_turn
+        identity = 0.0_wp
+        do step = 1, 6
+            identity(step, step) = 1.0_wp
+        end do
+        product = identity
+        do step = 1, 100000
+            call flow_tangent(body, 0.01_wp, m, q, phi)
+            ! As increments: a step is close to 1, and the rounding of products would exceed its own.
+            product = product + matmul(phi - identity, product)
+        end do
+        residual = norm2(matmul(transpose(product), matmul(structure(m), product)) - structure(m0)) &
+                   /norm2(product)**2
+        call t%at_most('symplectic-after-1e5-steps', residual, 1.0e-14_wp)
+        m = m0
+        q = no_turn
+        call flow_tangent(body, 1000.0_wp, m, q, phi)
+        call t%at_most('1e5-steps-are-one', norm2(product - phi)/norm2(phi), 1.0e-11_wp)
+    end subroutine check_composition
+
+    !> Runs under torque: the derivative against differences, and its structure; a motion at a time.
+    subroutine check_runs(t)
+        type(tally), intent(inout) :: t
+        real(wp), parameter :: moments(3) = [0.5_wp, 0.85_wp, 1.0_wp], step = 1.0e-5_wp
+        type(rigid_body) :: body
+        type(free_motion) :: motion
+        type(heavy_top) :: top
+        type(splitting_scheme) :: scheme
+        real(wp) :: m0(3), q0(4), m(3), q(4), phi(6, 6), differences(6, 6), ends(7, 2), move(6), residual, &
+            time
+        integer :: k, side, code
+
+        body = rigid_body(moments)
+        scheme = splitting_scheme('srkn11')
+        m0 = [0.3_wp, -0.6_wp, 0.4_wp]
+        q0 = [0.8_wp, 0.0_wp, 0.6_wp, 0.0_wp]
+        do k = 1, 6
+            do side = 1, 2
+                move = 0.0_wp
+                move(k) = (3 - 2*side)*step
+                m = m0 + move(1:3)
+                q = quat_product(q0, [cos(0.5_wp*norm2(move(4:6))), sin(0.5_wp*step)/step*move(4:6)])
+                call integrate(body, scheme, top, 0.1_wp, 30, m, q)
+                ends(:, side) = [m, q]
+            end do
+            differences(1:3, k) = (ends(1:3, 1) - ends(1:3, 2))/(2*step)
+            q = quat_product(quat_conjugate(ends(4:7, 2)), ends(4:7, 1))
+            differences(4:6, k) = 2*q(2:4)/(2*step)
+        end do
+        m = m0
+        q = q0
+        time = 1.0_wp
+        call integrate_tangent(body, scheme, top, 0.1_wp, 30, m, q, phi, time)
+        call t%at_most('run-of-a-top-against-differences', norm2(phi - differences)/norm2(phi), 1.0e-8_wp)
+        residual = norm2(matmul(transpose(phi), matmul(structure(m), phi)) - structure(m0))/norm2(phi)**2
+        call t%at_most('run-of-a-top-is-symplectic', residual, 100*eps)
+        call t%close_to('run-of-a-top-takes-its-time', [time], [4.0_wp], 8*eps)
+        ends(:, 1) = [m, q]
+        m = m0
+        q = q0
+        call integrate(body, scheme, top, 0.1_wp, 30, m, q)
+        call t%close_to('run-of-a-top-is-that-of-integrate', ends(:, 1), [m, q], 40*eps)
+        call integrate_tangent(body, scheme, top, 0.1_wp, -1, m, q, phi, stat=code)
+        call t%equal('run-of-a-negative-number-of-steps', code, status_bad_count)
+        call integrate_tangent(body, splitting_scheme('fg4'), top, 0.1_wp, 1, m, q, phi, stat=code)
+        call t%equal('run-with-modified-kicks', code, status_not_offered)
+        motion = free_motion(body, m0, q0)
+        call motion%tangent(7.0_wp, phi)
+        m = m0
+        q = q0
+        call flow_tangent(body, 7.0_wp, m, q, differences)
+        call t%at_most('motion-at-a-time', maxval(abs(phi - differences)), 0.0_wp)
+        motion = free_motion(body, m0, 0*q0)
+        call motion%tangent(7.0_wp, phi, code)
+        call t%equal('motion-that-could-not-be-made', code, status_bad_attitude)
+        call t%at_most('motion-that-could-not-be-made-has-the-derivative-1', abs(norm2(phi)**2 - 6), 8*eps)
+    end subroutine check_runs
+
+end module frb_test_tangent_runs
