@@ -19,7 +19,7 @@ mpi_ranks_agree() {
     apt_package mpirun openmpi-bin
     # As root, and with more ranks than cores.
     export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
-    run='timeout 60 mpirun --oversubscribe --mca mpi_yield_when_idle 1'
+    run='timeout 300 mpirun --oversubscribe --mca mpi_yield_when_idle 1'
     cd examples/mpi
     "$fpm" install --prefix installed --compiler mpifort --profile release
     for ranks in 1 2 3; do
