@@ -1,8 +1,8 @@
 !> Elliptic integral of the first kind and Jacobi elliptic functions by the arithmetic-geometric mean and
 !> Landen's transformation, section 3.2.
 !>
-!> The argument is the modulus k, 0 <= |k| <= 1, as in the paper. Close to k = 1 everything depends on
-!> 1 - k**2; each routine takes it as an optional kc2, so that nothing is lost there: k is then not used.
+!> The argument is the modulus k, 0 <= |k| <= 1, as in the paper. Close to k = 1 all functions depend on
+!> 1 - k**2. Each routine takes this number as an optional kc2, so that no digit is lost; k is then not used.
 !>
 !> The sequence a(n+1) = (a(n) + b(n))/2, b(n+1) = sqrt(a(n) b(n)) from a = 1, b = sqrt(1 - k**2) carries the
 !> amplitude by (17), tan(phi(n+1) - phi(n)) = (b(n)/a(n)) tan(phi(n)), and F(phi) = phi(N)/(2**N a(N)).
@@ -10,12 +10,14 @@
 !>
 !>     y(n+1) = y(n) - 4**n a(n) b(n)/y(n),      w(n+1) = y(n) + 4**n a(n) b(n)/y(n),
 !>
-!> so the step up costs a division, the step down, y(n) = (w(n+1) +- y(n+1))/2, a square root, and neither a
-!> tangent nor an arcsine; at the end y(0) = cn/sn and w(0) = dn/sn, without cancellation as k tends to 1.
-!> Once a and b are close, three terms of a series in c = (a - b)/(a + b) replace the remaining two or three
-!> steps. The half turns that the cotangent does not see are counted: their number doubles at each step up,
-!> plus one where y(n) < 0; on the way down their lowest bit gives the sign of y(n).
+!> so a step up costs one division. A step down, y(n) = (w(n+1) +- y(n+1))/2, costs one square root. Neither
+!> needs a tangent or an arcsine. At the end y(0) = cn/sn and w(0) = dn/sn, without cancellation as k tends to
+!> 1. Once a and b are close, three terms of a series in c = (a - b)/(a + b), here called the gap, replace the
+!> last two or three steps. The cotangent does not see half turns, so their number is kept beside it: each
+!> step up doubles the number and adds one where y(n) < 0. On the way down the lowest bit of the number gives
+!> the sign of y(n).
 module frb_agm
+    use frb_complements, only: modulus_complement
     use frb_kinds, only: wp, pi, half_pi
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_value, ieee_quiet_nan, ieee_positive_inf
     implicit none
@@ -23,33 +25,35 @@ module frb_agm
 
     public :: ellip_k, ellip_f, jacobi_am, jacobi, landen_step, half_turns
 
-    !> 1 - k**2 = 5e-324, the smallest above zero, takes 13 steps.
+    !> The smallest 1 - k**2 above zero, 5e-324, takes 13 steps.
     integer, parameter :: most_steps = 16
 
-    !> Once c = (a - b)/(a + b) is below this, the rest of the transformation is a short series in c.
-    integer, parameter :: most_means = 64       !! a bound for NaN, where compilers assume there is none
+    !> Bound of a loop that would not end for NaN where a compiler assumes that there is no NaN (-Ofast).
+    integer, parameter :: most_means = 64
+
+    !> Where the gap is below this radius, a short series takes the place of all further steps.
     real(wp), parameter :: series_radius = 1.0e-4_wp
 
-    !> The same for the mean alone, which is even in c: the first term left out is 11 c**6/256.
+    !> The same for the mean alone, which is even in the gap: the first term left out is 11 c**6/256.
     real(wp), parameter :: mean_radius = 3.0e-3_wp
 
-    !> Below this an angle equals its sine, its integral F and its amplitude to rounding: u**3/6 < eps u/4.
+    !> An angle u below this bound equals its sine, its F and its amplitude to rounding, u**3/6 < eps u/4.
     real(wp), parameter :: small_angle = 1.0e-8_wp
 
-    !> Beyond this ratio of y(n) to y(n+1) an angle cannot be told from 0 or pi.
+    !> Where y(n)/y(n+1) is beyond this ratio, rounding makes the angle 0 or pi.
     real(wp), parameter :: far = 1.0e20_wp
 
-    !> pi in two parts; the first has 30 bits, so that its product with a count below 2**23 is exact.
+    !> pi as a sum of two parts. The first has 30 bits: its product with a count below 2**23 is exact.
     real(wp), parameter :: pi_high = 3.1415926516056060791015625_wp
     real(wp), parameter :: pi_low = 1.9841871593610808832795e-9_wp
 
-    !> The sequence from 1 and sqrt(kc2), as far as it is needed.
+    !> The sequence from 1 and sqrt(kc2), up to the step N where the series take over.
     type :: agm_sequence
         integer :: steps = 0                  !! N
         real(wp) :: mean = 1.0_wp             !! the limit of a(n)
         real(wp) :: power = 1.0_wp            !! 2**N
         real(wp) :: top = 1.0_wp              !! 2**N a(N)
-        real(wp) :: c = 0.0_wp                !! (a(N) - b(N))/(a(N) + b(N)), at most `series_radius`
+        real(wp) :: gap = 0.0_wp              !! c = (a(N) - b(N))/(a(N) + b(N)) <= `series_radius`
         real(wp) :: product(0:most_steps)     !! 4**n a(n) b(n), n = 0..N-1
         real(wp) :: square(0:most_steps)      !! 4**n b(n)**2, n = 0..N
     end type agm_sequence
@@ -65,11 +69,10 @@ contains
         real(wp), intent(in), optional :: kc2      !! 1 - k**2; k is then not used
         real(wp) :: value
         real(wp) :: complement, a, b, next
-        logical :: valid
         integer :: n
 
-        call complement_of(k, kc2, complement, valid)
-        if (.not. valid) then
+        complement = modulus_complement(k, kc2)
+        if (complement < 0.0_wp) then
             value = ieee_value(1.0_wp, ieee_quiet_nan)
         else if (complement <= 0.0_wp) then
             value = ieee_value(1.0_wp, ieee_positive_inf)
@@ -88,7 +91,7 @@ contains
 
     !> Integral of the first kind F(phi, k) = int_0^phi dtheta/sqrt(1 - k**2 sin(theta)**2), (21).
     !> Domain: any finite phi, |k| <= 1 (or 0 <= kc2 <= 1), outside: NaN. At k = 1: the inverse Gudermannian
-    !> within +-pi/2, +-Infinity beyond; so is a result beyond the largest number.
+    !> within +-pi/2, +-Infinity beyond. A result beyond the largest number is +-Infinity too.
     !> Accuracy: 6 epsilon, relative, times the change that half an ulp of phi makes where that is larger;
     !> checked by agm: incomplete-integral-agrees-with-table.
     !> Source: (17)-(19).
@@ -98,11 +101,10 @@ contains
         real(wp), intent(in), optional :: kc2      !! 1 - k**2; k is then not used
         real(wp) :: value
         type(agm_sequence) :: agm
-        real(wp) :: complement, turns, rest
-        logical :: valid
+        real(wp) :: complement, turns, remainder
 
-        call complement_of(k, kc2, complement, valid)
-        if (.not. (valid .and. ieee_is_finite(phi))) then
+        complement = modulus_complement(k, kc2)
+        if (complement < 0.0_wp .or. .not. ieee_is_finite(phi)) then
             value = ieee_value(1.0_wp, ieee_quiet_nan)
         else if (abs(phi) < small_angle) then
             value = phi
@@ -113,10 +115,10 @@ contains
                 value = sign(ieee_value(1.0_wp, ieee_positive_inf), phi)
             end if
         else
-            call half_turns(phi, turns, rest)
+            call half_turns(phi, turns, remainder)
             call start_agm(complement, agm)
             if (1.0e-10_wp*abs(phi) < agm%mean*(1.0e-10_wp*huge(1.0_wp)/2)) then
-                value = (turns*pi + scaled_angle(sin(rest), cos(rest), agm)/agm%power)/agm%mean
+                value = (turns*pi + scaled_angle(sin(remainder), cos(remainder), agm)/agm%power)/agm%mean
             else
                 value = sign(ieee_value(1.0_wp, ieee_positive_inf), phi)
             end if
@@ -132,10 +134,9 @@ contains
         real(wp), intent(in), optional :: kc2      !! 1 - k**2; k is then not used
         real(wp) :: phi
         real(wp) :: complement, sn, cn, dn
-        logical :: valid
 
-        call complement_of(k, kc2, complement, valid)
-        if (.not. (valid .and. ieee_is_finite(u))) then
+        complement = modulus_complement(k, kc2)
+        if (complement < 0.0_wp .or. .not. ieee_is_finite(u)) then
             phi = ieee_value(1.0_wp, ieee_quiet_nan)
         else
             call functions_at(u, complement, sn, cn, dn, phi)
@@ -152,10 +153,9 @@ contains
         real(wp), intent(out) :: sn, cn, dn        !! sin(am u), cos(am u), sqrt(1 - k**2 sn**2)
         real(wp), intent(in), optional :: kc2      !! 1 - k**2; k is then not used
         real(wp) :: complement
-        logical :: valid
 
-        call complement_of(k, kc2, complement, valid)
-        if (.not. (valid .and. ieee_is_finite(u))) then
+        complement = modulus_complement(k, kc2)
+        if (complement < 0.0_wp .or. .not. ieee_is_finite(u)) then
             sn = ieee_value(1.0_wp, ieee_quiet_nan)
             cn = sn
             dn = sn
@@ -164,12 +164,11 @@ contains
         end if
     end subroutine jacobi
 
-    !> The momentum step of section 3.2 (EgellipX_step): from (sn0, cn0) at u0 to sn, cn, dn at u0 + du, and
-    !> the amplitudes phi0 = am(u0) in [-pi, pi] and phi1 = am(u0 + du), continuous with phi0, so that
-    !> phi1 - phi0 counts the turns. One sequence serves both transformations, from phi0 and
-    !> back from u0 + du.
-    !> sn0**2 + cn0**2 need not be one to rounding: only the angle counts, and sn0 = cn0 = 0 stands for 0.
-    !> At k = 1 the motion tends to sn = +-1; there cn keeps the sign of cn0, and cn0 = 0 stays at rest.
+    !> The momentum step of section 3.2 (EgellipX_step): from sn and cn at u0 to sn, cn, dn at u0 + du.
+    !> The amplitudes come back too, phi0 = am(u0) in [-pi, pi] and phi1 = am(u0 + du). They are continuous:
+    !> phi1 - phi0 counts the turns. Both transformations, up from phi0 and down to phi1, use one sequence.
+    !> sn0**2 + cn0**2 may differ from one: only the angle of (cn0, sn0) is used, and (0, 0) has the angle 0.
+    !> At k = 1 the motion tends to sn = +-1: cn keeps the sign of cn0, and from cn0 = 0 nothing moves.
     !> Domain: |k| <= 1 (or 0 <= kc2 <= 1), all arguments finite, |sn0|, |cn0| <= 1e100; outside: NaN.
     !> Accuracy: as of `jacobi` at u0 + du; checked by agm: momentum-step-agrees-with-jacobi.
     pure subroutine landen_step(sn0, cn0, du, k, sn, cn, dn, phi0, phi1, kc2)
@@ -183,8 +182,8 @@ contains
         real(wp) :: complement
         logical :: valid
 
-        call complement_of(k, kc2, complement, valid)
-        if (valid) valid = ieee_is_finite(sn0) .and. ieee_is_finite(cn0) .and. ieee_is_finite(du)
+        complement = modulus_complement(k, kc2)
+        valid = complement >= 0.0_wp .and. all(ieee_is_finite([sn0, cn0, du]))
         if (valid) valid = max(abs(sn0), abs(cn0)) <= 1.0e100_wp
         if (.not. valid) then
             sn = ieee_value(1.0_wp, ieee_quiet_nan)
@@ -204,48 +203,29 @@ contains
         end if
     end subroutine landen_step
 
-    !> phi = turns pi + rest with a whole number of turns and |rest| <= pi/2.
-    !> An angle that is pi/2 as a number is below pi/2, so it keeps turns = 0.
-    !> Beyond 2**23 turns the library's own reduction of the tangent takes over.
-    elemental subroutine half_turns(phi, turns, rest)
-        real(wp), intent(in) :: phi
-        real(wp), intent(out) :: turns   !! a whole number, real since it may exceed any integer kind
-        real(wp), intent(out) :: rest
+    !> phi = turns pi + remainder with a whole number of turns and |remainder| <= pi/2.
+    !> The double next to pi/2 is below pi/2: its number of turns is 0.
+    !> Beyond 2**23 turns the reduction inside the intrinsic `tan` is used.
+    elemental subroutine half_turns(phi, turns, remainder)
+        real(wp), intent(in) :: phi                !! angle [rad]
+        real(wp), intent(out) :: turns             !! a whole number, real as it may exceed any integer kind
+        real(wp), intent(out) :: remainder         !! [rad]
 
         if (abs(phi) <= half_pi) then
             turns = 0.0_wp
-            rest = phi
+            remainder = phi
         else
             turns = anint(phi*(1/pi))
             if (abs(turns) < 2.0_wp**23) then
-                rest = (phi - turns*pi_high) - turns*pi_low
+                remainder = (phi - turns*pi_high) - turns*pi_low
             else
-                rest = atan(tan(phi))
-                turns = anint((phi - rest)/pi)
+                remainder = atan(tan(phi))
+                turns = anint((phi - remainder)/pi)
             end if
         end if
     end subroutine half_turns
 
     ! ------------------------------------------------------------------------------------------ inner parts
-
-    !> 1 - k**2 from the arguments, and whether they are in the domain.
-    pure subroutine complement_of(k, kc2, complement, valid)
-        real(wp), intent(in) :: k
-        real(wp), intent(in), optional :: kc2
-        real(wp), intent(out) :: complement
-        logical, intent(out) :: valid
-
-        complement = 1.0_wp
-        if (present(kc2)) then
-            valid = ieee_is_finite(kc2)
-            if (valid) valid = kc2 >= 0.0_wp .and. kc2 <= 1.0_wp
-            if (valid) complement = kc2
-        else
-            valid = ieee_is_finite(k)
-            if (valid) valid = abs(k) <= 1.0_wp
-            if (valid) complement = (1 - k)*(1 + k)
-        end if
-    end subroutine complement_of
 
     !> The sequence for 1 - k**2 = kc2 > 0, to the step where the series take over.
     pure subroutine start_agm(kc2, agm)
@@ -269,8 +249,8 @@ contains
         agm%steps = n
         agm%power = power
         agm%top = power*a
-        agm%c = (a - b)/(a + b)
-        agm%mean = mean_of(a, b, agm%c)
+        agm%gap = (a - b)/(a + b)
+        agm%mean = mean_of(a, b, agm%gap)
     end subroutine start_agm
 
     !> Limit of the sequence from a and b with c = (a - b)/(a + b) small:
@@ -283,24 +263,23 @@ contains
         mean = mean - mean*(c*c)*(0.25_wp + (5.0_wp/64)*(c*c))
     end function mean_of
 
-    !> 2**N a F for the angle in [-pi, pi] with the given sine and cosine (up to a common factor), a the
-    !> limit.
-    !> Above step N the transformation (17) is, but for terms in c**4,
+    !> 2**N a F of an angle in [-pi, pi], a the limit of a(n), from the sine and cosine of the angle, which
+    !> may have a common factor. All steps (17) above N together are, up to terms in c**4,
     !> phi -> phi - (c/2 + c**3/16) sin(2 phi) + (3 c**2/16) sin(4 phi) - (5 c**3/48) sin(6 phi).
     pure function scaled_angle(sine, cosine, agm) result(angle)
         real(wp), intent(in) :: sine, cosine
         type(agm_sequence), intent(in) :: agm
         real(wp) :: angle
-        real(wp) :: y, s, turns, s2, c2, inverse
+        real(wp) :: y, height, turns, sine2, cosine2, inverse
         integer :: n
 
-        s = abs(sine)
-        if (s <= small_angle*abs(cosine)) then
+        height = abs(sine)
+        if (height <= small_angle*abs(cosine)) then
             angle = 0.0_wp
-            if (s > 0.0_wp) angle = agm%power*agm%mean*s/abs(cosine)
+            if (height > 0.0_wp) angle = agm%power*agm%mean*height/abs(cosine)
             if (cosine < 0.0_wp) angle = agm%power*pi - angle
         else
-            y = cosine/s
+            y = cosine/height
             turns = 0.0_wp
             do n = 0, agm%steps - 1
                 if (abs(y) < agm%product(n)*(1/far)) y = agm%product(n)*(1/far)
@@ -309,10 +288,10 @@ contains
                 y = y - agm%product(n)/y
             end do
             inverse = 1/(y*y + agm%top*agm%top)
-            s2 = 2*y*agm%top*inverse
-            c2 = (y*y - agm%top*agm%top)*inverse
-            angle = atan2(agm%top, y) - agm%c*s2*(0.5_wp + agm%c*(-0.375_wp*c2 &
-                + agm%c*(0.375_wp - (5.0_wp/12)*s2*s2)))
+            sine2 = 2*y*agm%top*inverse
+            cosine2 = (y*y - agm%top*agm%top)*inverse
+            angle = atan2(agm%top, y) - agm%gap*sine2*(0.5_wp + agm%gap*(-0.375_wp*cosine2 &
+                + agm%gap*(0.375_wp - (5.0_wp/12)*sine2*sine2)))
             angle = turns*pi + angle
         end if
         angle = sign(angle, sine)
@@ -339,67 +318,69 @@ contains
         end if
     end subroutine functions_at
 
-    !> From a F = start + a du, a the limit of the sequence, down to sn, cn, dn and, where asked for, the
-    !> amplitude. Above step N the transformation is, but for terms in c**4,
-    !> phi -> phi + (c/2 + 3 c**3/32) sin(2 phi) + (c**2/16) sin(4 phi) + (c**3/96) sin(6 phi).
+    !> From a F = start + a du, a the limit of a(n), down to sn, cn, dn and, if present, the amplitude phi.
+    !> All steps above N together are, up to terms in c**4,
+    !> phi -> phi + (c/2 + 3 c**3/32) sin(2 phi) + (c**2/16) sin(4 phi) + (c**3/96) sin(6 phi),
+    !> a shift of at most 5e-5: two series terms give its sine and cosine. Then y(N) = 2**N a(N) cot(phi).
     pure subroutine descend(start, du, agm, sn, cn, dn, phi)
         real(wp), intent(in) :: start, du
         type(agm_sequence), intent(in) :: agm
         real(wp), intent(out) :: sn, cn, dn
         real(wp), intent(out), optional :: phi
-        real(wp) :: angle, turns, rest, y, w, s, c, s2, c2, shift, large, sense
+        real(wp) :: angle, turns, remainder, y, w, sine, cosine, sine2, cosine2, shift, sine_shift, &
+            one_minus_cosine, larger, sense
         integer :: n, count
         logical :: negative
 
-        call half_turns(start + agm%mean*du, turns, rest)
+        call half_turns(start + agm%mean*du, turns, remainder)
         sense = 1 - 2*abs(turns - 2*anint(0.5_wp*turns))   ! (-1)**turns
-        angle = agm%power*abs(rest)
+        angle = agm%power*abs(remainder)
         count = int(angle*(1/pi))
-        s = sin(angle)
-        c = cos(angle)
-        s2 = 2*s*c
-        c2 = (c - s)*(c + s)
-        shift = agm%c*s2*(0.5_wp + agm%c*(0.125_wp*c2 + agm%c*(0.125_wp - (1.0_wp/24)*s2*s2)))
-        ! sine and cosine of angle + shift, |shift| <= 5e-5
-        s2 = shift*(1 - shift*shift*(1.0_wp/6))
-        c2 = 0.5_wp*shift*shift
-        y = c - (s*s2 + c*c2)
-        s = s + (c*s2 - s*c2)
+        sine = sin(angle)
+        cosine = cos(angle)
+        sine2 = 2*sine*cosine
+        cosine2 = (cosine - sine)*(cosine + sine)
+        shift = agm%gap*sine2*(0.5_wp + agm%gap*(0.125_wp*cosine2 + agm%gap*(0.125_wp &
+                - (1.0_wp/24)*sine2*sine2)))
+        sine_shift = shift*(1 - shift*shift*(1.0_wp/6))
+        one_minus_cosine = 0.5_wp*shift*shift
+        y = cosine - (sine*sine_shift + cosine*one_minus_cosine)
+        sine = sine + (cosine*sine_shift - sine*one_minus_cosine)
         if (btest(count, 0)) then
-            s = -s
+            sine = -sine
             y = -y
         end if
-        if (s < 0.0_wp) then   ! angle/pi is so close to a whole number that rounding chose the wrong one
-            s = -s
+        if (sine < 0.0_wp) then   ! angle/pi is nearly a whole number, and rounding chose the wrong count
+            sine = -sine
             y = -y
             count = count + merge(-1, 1, y < 0.0_wp)
         end if
-        y = agm%top*y/max(s, 1/far)
+        y = agm%top*y/max(sine, 1/far)
         w = sqrt(y*y + agm%square(agm%steps))
         do n = agm%steps - 1, 0, -1
             negative = btest(count, 0)
             count = count/2
-            large = 0.5_wp*(w + abs(y))
-            if ((y < 0.0_wp) .neqv. negative) large = agm%product(n)/large
-            y = merge(-large, large, negative)
+            larger = 0.5_wp*(w + abs(y))
+            if ((y < 0.0_wp) .neqv. negative) larger = agm%product(n)/larger
+            y = merge(-larger, larger, negative)
             w = sqrt(y*y + agm%square(n))
         end do
         sn = 1/sqrt(1 + y*y)
         cn = y*sn*sense
         dn = w*sn
-        if (present(phi)) phi = turns*pi_high + (turns*pi_low + sign(atan2(1.0_wp, y), rest))
-        sn = sign(sn, rest)*sense
+        if (present(phi)) phi = turns*pi_high + (turns*pi_low + sign(atan2(1.0_wp, y), remainder))
+        sn = sign(sn, remainder)*sense
     end subroutine descend
 
-    !> The step for k = 1: sn = tanh, cn = sech, amplitude the Gudermannian; on the branch cn < 0 the same
-    !> motion half a turn away.
+    !> The step for k = 1: sn = tanh, cn = sech, and the amplitude is the Gudermannian. On the branch cn < 0
+    !> the motion is the same, half a turn away.
     pure subroutine separatrix_step(sn0, cn0, du, sn, cn, phi)
         real(wp), intent(in) :: sn0, cn0, du
         real(wp), intent(out) :: sn, cn
         real(wp), intent(out), optional :: phi
         real(wp) :: u, decay
 
-        if (abs(cn0) <= 1.0e-300_wp*abs(sn0)) then   ! at rest, or closer to it than a number can tell
+        if (abs(cn0) <= 1.0e-300_wp*abs(sn0)) then   ! at rest, to rounding
             sn = sign(1.0_wp, sn0)
             cn = 0.0_wp
             if (present(phi)) phi = sign(half_pi, sn0)

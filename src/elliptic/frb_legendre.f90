@@ -3,11 +3,12 @@
 !>     Pi(phi, n, k) = int_0^phi dtheta / ((1 - n sin(theta)**2) sqrt(1 - k**2 sin(theta)**2))      (22)
 !>
 !> The sign of n is the paper's, (22): the integral has a pole at sin(theta)**2 = 1/n. The modulus is k.
-!> Where 1 - k**2 or 1 - n is known better than k or n (close to the separatrix both are small), pass kc2 or
-!> nc; k or n is then used only where it does no harm.
+!> Close to the separatrix 1 - k**2 and 1 - n are small, and better known than k and n. Pass them as kc2 and
+!> nc: k is then not used, and n only as the factor of a term, where its rounding does not count.
 module frb_legendre
     use frb_agm, only: half_turns
     use frb_carlson, only: rf, rf_and_rj
+    use frb_complements, only: modulus_complement, one_minus
     use frb_kinds, only: wp, pi, half_pi
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_value, ieee_quiet_nan, ieee_positive_inf
     implicit none
@@ -15,10 +16,11 @@ module frb_legendre
 
     public :: ellpi, ellint_pi, ellint_pi_between
 
-    !> Below -1 the terms of RF - |n|/3 RJ would cancel; n is then taken to (k**2 - n)/(1 - n), in (k**2, 1).
-    real(wp), parameter :: lowest_plain = -1.0_wp
+    !> For n below this bound the terms of RF - |n|/3 RJ would cancel, and `pi_of_negative` takes over.
+    real(wp), parameter :: lowest_direct = -1.0_wp
 
-    !> Beyond this 1 - n the integral is that of k = 0 to rounding; below this kc2 it enters through F alone.
+    !> For 1 - n beyond the first bound Pi does not depend on k, to rounding. For kc2 below the second bound
+    !> only F depends on kc2.
     real(wp), parameter :: largest_divisor = 1.0e40_wp, smallest_complement = 1.0e-250_wp
 
 contains
@@ -36,24 +38,24 @@ contains
         real(wp), intent(in), optional :: kc2      !! 1 - k**2
         real(wp), intent(in), optional :: nc       !! 1 - n
         real(wp) :: value
-        real(wp) :: complement, rest
+        real(wp) :: complement, difference
         logical :: valid
 
-        call complements_of(n, k, kc2, nc, complement, rest, valid)
+        call check_domain(n, k, kc2, nc, complement, difference, valid)
         if (valid) valid = ieee_is_finite(phi)
         if (valid) valid = abs(phi) <= half_pi
         if (valid) then
-            value = pi_of_sine(sin(phi), cos(phi), n, complement, rest)
+            value = pi_of_sine(sin(phi), cos(phi), n, complement, difference)
         else
             value = ieee_value(1.0_wp, ieee_quiet_nan)
         end if
     end function ellpi
 
     !> Pi(phi2, n, k) - Pi(phi1, n, k), the integral from phi1 to phi2, any amplitudes.
-    !> Whole half turns are counted by the complete integral, the rest is a difference of two incomplete ones.
+    !> Each half turn adds two complete integrals; the remaining angles add two incomplete ones.
     !> Domain: phi1, phi2 finite, |k| <= 1, n < 1 (or n sin**2 < 1 on the whole way); outside: NaN.
-    !> An integral across pi/2 + j pi at k = 1 or nc = 0, or one beyond the largest number, is Infinity with
-    !> the sign of phi2 - phi1.
+    !> An integral across pi/2 + j pi at k = 1 or nc = 0 is Infinity with the sign of phi2 - phi1, and so is a
+    !> value beyond the largest number.
     !> Accuracy: 8 epsilon (|Pi(phi1)| + |Pi(phi2)|), and the change that half an ulp of the amplitudes makes;
     !> checked by legendre: difference-of-any-amplitudes-agrees-with-table.
     !> Source: section 3.4 (`ellint_pi`).
@@ -64,24 +66,24 @@ contains
         real(wp), intent(in), optional :: kc2      !! 1 - k**2
         real(wp), intent(in), optional :: nc       !! 1 - n
         real(wp) :: value
-        real(wp) :: complement, rest, turns1, turns2, rest1, rest2
+        real(wp) :: complement, difference, turns1, turns2, angle1, angle2
         logical :: valid
 
-        call complements_of(n, k, kc2, nc, complement, rest, valid)
+        call check_domain(n, k, kc2, nc, complement, difference, valid)
         if (valid) valid = ieee_is_finite(phi1) .and. ieee_is_finite(phi2)
         if (valid) then
-            call half_turns(phi1, turns1, rest1)
-            call half_turns(phi2, turns2, rest2)
-            value = pi_between(turns1, sin(rest1), cos(rest1), turns2, sin(rest2), cos(rest2), &
-                               n, complement, rest)
+            call half_turns(phi1, turns1, angle1)
+            call half_turns(phi2, turns2, angle2)
+            value = pi_between(turns1, sin(angle1), cos(angle1), turns2, sin(angle2), cos(angle2), &
+                               n, complement, difference)
         else
             value = ieee_value(1.0_wp, ieee_quiet_nan)
         end if
     end function ellint_pi
 
-    !> As `ellint_pi`, for amplitudes whose sine and cosine are known, as they are in a step: sn and cn carry
-    !> the accuracy close to multiples of pi/2, the amplitudes serve to count the half turns only.
-    !> Domain and accuracy: as `ellint_pi`, without the part that comes from rounding the amplitudes.
+    !> As `ellint_pi`, for amplitudes whose sine and cosine are known, as in a step. The value is formed from
+    !> sn and cn, so it is accurate close to multiples of pi/2 too; the amplitudes only count half turns.
+    !> Domain and accuracy: as `ellint_pi`, without the error that comes from rounding the amplitudes.
     elemental function ellint_pi_between(phi1, sn1, cn1, phi2, sn2, cn2, n, k, kc2, nc) result(value)
         real(wp), intent(in) :: phi1, sn1, cn1     !! amplitude at the start [rad], its sine and cosine
         real(wp), intent(in) :: phi2, sn2, cn2     !! amplitude at the end [rad], its sine and cosine
@@ -90,16 +92,15 @@ contains
         real(wp), intent(in), optional :: kc2      !! 1 - k**2
         real(wp), intent(in), optional :: nc       !! 1 - n
         real(wp) :: value
-        real(wp) :: complement, rest
         logical :: valid
+        real(wp) :: complement, difference
 
-        call complements_of(n, k, kc2, nc, complement, rest, valid)
-        if (valid) valid = ieee_is_finite(phi1) .and. ieee_is_finite(phi2)
-        if (valid) valid = ieee_is_finite(sn1) .and. ieee_is_finite(cn1) .and. ieee_is_finite(sn2) &
-            .and. ieee_is_finite(cn2)
+        call check_domain(n, k, kc2, nc, complement, difference, valid)
+        if (valid) valid = all(ieee_is_finite([phi1, sn1, cn1, phi2, sn2, cn2]))
         if (valid) then
             value = pi_between(counted_turns(phi1, cn1), sign(1.0_wp, cn1)*sn1, abs(cn1), &
-                               counted_turns(phi2, cn2), sign(1.0_wp, cn2)*sn2, abs(cn2), n, complement, rest)
+                               counted_turns(phi2, cn2), sign(1.0_wp, cn2)*sn2, abs(cn2), n, &
+                               complement, difference)
         else
             value = ieee_value(1.0_wp, ieee_quiet_nan)
         end if
@@ -107,34 +108,20 @@ contains
 
     ! ------------------------------------------------------------------------------------------ inner parts
 
-    !> 1 - k**2 and 1 - n from the arguments, and whether they are in the domain.
-    pure subroutine complements_of(n, k, kc2, nc, complement, rest, valid)
+    !> 1 - k**2 and 1 - n, and whether both and n are finite and |k| <= 1.
+    pure subroutine check_domain(n, k, kc2, nc, complement, difference, valid)
         real(wp), intent(in) :: n, k
         real(wp), intent(in), optional :: kc2, nc
         real(wp), intent(out) :: complement   !! 1 - k**2
-        real(wp), intent(out) :: rest         !! 1 - n
+        real(wp), intent(out) :: difference   !! 1 - n
         logical, intent(out) :: valid
 
-        complement = 1.0_wp
-        rest = 1.0_wp
-        valid = ieee_is_finite(n)
-        if (valid) rest = 1 - n
-        if (present(nc)) then
-            if (valid) valid = ieee_is_finite(nc)
-            if (valid) rest = nc
-        end if
-        if (present(kc2)) then
-            if (valid) valid = ieee_is_finite(kc2)
-            if (valid) valid = kc2 >= 0.0_wp .and. kc2 <= 1.0_wp
-            if (valid) complement = kc2
-        else
-            if (valid) valid = ieee_is_finite(k)
-            if (valid) valid = abs(k) <= 1.0_wp
-            if (valid) complement = (1 - k)*(1 + k)
-        end if
-    end subroutine complements_of
+        complement = modulus_complement(k, kc2)
+        difference = one_minus(n, nc)
+        valid = complement >= 0.0_wp .and. ieee_is_finite(n) .and. ieee_is_finite(difference)
+    end subroutine check_domain
 
-    !> Number of half turns of phi, made to agree with the sign of the cosine close to pi/2 + j pi.
+    !> Number of half turns of phi: odd exactly if the cosine is negative, also close to pi/2 + j pi.
     pure function counted_turns(phi, cosine) result(turns)
         real(wp), intent(in) :: phi, cosine
         real(wp) :: turns
@@ -145,7 +132,8 @@ contains
         if (odd .neqv. sign(1.0_wp, cosine) < 0.0_wp) turns = turns + sign(1.0_wp, phi - turns*pi)
     end function counted_turns
 
-    !> The difference for amplitudes in half turns and rest, the rest by sine and cosine.
+    !> Pi(phi2) - Pi(phi1) for amplitudes phi = turns pi + angle, |angle| <= pi/2, s and c the sine and cosine
+    !> of the angle.
     pure function pi_between(turns1, s1, c1, turns2, s2, c2, n, kc2, nc) result(value)
         real(wp), intent(in) :: turns1, s1, c1, turns2, s2, c2, n, kc2, nc
         real(wp) :: value
@@ -155,7 +143,7 @@ contains
         value = 0.0_wp
         if (abs(turns) > 0.5_wp) then
             complete = pi_of_sine(1.0_wp, 0.0_wp, n, kc2, nc)
-            if (.not. ieee_is_finite(complete)) then   ! NaN, or an infinite integral in the middle of the way
+            if (.not. ieee_is_finite(complete)) then   ! NaN, or infinite between phi1 and phi2
                 value = complete
                 if (complement_vanishes(kc2, nc)) value = sign(complete, turns)
                 return
@@ -177,7 +165,8 @@ contains
         vanishes = nc >= 0.0_wp .and. min(kc2, nc) <= 0.0_wp
     end function complement_vanishes
 
-    !> Pi for the amplitude in [-pi/2, pi/2] with sine s and cosine c.
+    !> Pi for the amplitude in [-pi/2, pi/2] with sine s and cosine c, with p = 1 - n s**2:
+    !> s RF(c**2, 1 - k**2 s**2, 1) + n/3 s**3 RJ(c**2, 1 - k**2 s**2, 1, p) (DLMF 19.25.14).
     pure function pi_of_sine(s, c, n, kc2, nc) result(value)
         real(wp), intent(in) :: s, c, n, kc2, nc
         real(wp) :: value
@@ -191,7 +180,7 @@ contains
             value = ieee_value(1.0_wp, ieee_quiet_nan)
         else if (p <= 0.0_wp .or. (cc <= 0.0_wp .and. dd <= 0.0_wp)) then
             value = sign(ieee_value(1.0_wp, ieee_positive_inf), s)
-        else if (n >= lowest_plain) then
+        else if (n >= lowest_direct) then
             call rf_and_rj(cc, dd, 1.0_wp, p, first, third)
             value = s*(first + (n*(1.0_wp/3))*ss*third)
         else
@@ -199,20 +188,25 @@ contains
         end if
     end function pi_of_sine
 
-    !> Pi for n < -1, from the one with N = (k**2 - n)/(1 - n), 1 - N = kc2/nc: three terms of one sign,
-    !> -n kc2/(nc (k**2 - n)) Pi(N) + k**2/(k**2 - n) F + sqrt(-n/(nc (k**2 - n))) atan(..).
+    !> Pi for n < -1, as a sum of three terms of one sign. With N = (k**2 - n)/(1 - n), which lies between
+    !> k**2 and 1, and 1 - N = kc2/nc (A&S 17.7.15-17):
+    !>
+    !>     Pi(n) = -n kc2/(nc (k**2 - n)) Pi(N) + k**2/(k**2 - n) F
+    !>             + sqrt(-n/(nc (k**2 - n))) atan(sqrt(-n (k**2 - n)/nc) s c/sqrt(1 - k**2 s**2)).
+    !>
+    !> As kc2 tends to 0, the first term and the arctangent together no longer depend on kc2, while kc2/nc
+    !> could underflow: in these two terms kc2 is at least `smallest_complement`.
     pure function pi_of_negative(s, c, n, kc2, nc) result(value)
         real(wp), intent(in) :: s, c, n, kc2, nc
         real(wp) :: value
         real(wp) :: ss, cc, dd, first, third, k2, k2_minus_n, floored
 
-        ss = s*s
-        cc = c*c
         if (nc > largest_divisor) then
-            value = atan2(sqrt(nc)*s, c)/sqrt(nc)   ! but for a relative k**2 F/sqrt(nc), F < 400
+            value = atan2(sqrt(nc)*s, c)/sqrt(nc)   ! to a relative k**2 F/sqrt(nc), F < 400
             return
         end if
-        ! the first and the third term together forget kc2 as it goes to 0; so kc2/nc need not underflow
+        ss = s*s
+        cc = c*c
         floored = max(kc2, smallest_complement)
         dd = cc + floored*ss
         call rf_and_rj(cc, dd, 1.0_wp, cc + (floored/nc)*ss, first, third)

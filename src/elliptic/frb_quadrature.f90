@@ -1,5 +1,6 @@
 !> Gauss-Legendre quadrature, and the integral of the third kind by it (the semi-exact step).
 module frb_quadrature
+    use frb_complements, only: modulus_complement, one_minus
     use frb_kinds, only: wp, most_points
     use frb_lapack, only: dstev
     use frb_status, only: conclude, status_ok, status_bad_count, status_lapack_failed
@@ -13,9 +14,9 @@ module frb_quadrature
     !> Up to this many points nodes and weights come from a table.
     integer, parameter :: most_tabulated = 10
 
-    !> The nodes >= 0 of the rules with 1, 2, .. 10 points, descending within each rule, and their weights;
-    !> the rule with p points starts behind the first `before(p)` numbers. Roots of the Legendre polynomials
-    !> and 2/((1 - x**2) P'(x)**2) there, from 40-digit arithmetic.
+    !> The nodes x >= 0 of the rules with 1, 2, .. 10 points, descending within each rule, and their weights
+    !> 2/((1 - x**2) P'(x)**2), from 40-digit arithmetic. The rule with p points starts after the first
+    !> `before(p)` numbers. The nodes are the roots of the Legendre polynomial P of degree p.
     integer, parameter :: before(most_tabulated) = [0, 1, 2, 4, 6, 9, 12, 16, 20, 25]
     real(wp), parameter :: tabulated_nodes(30) = [ &
         0.0_wp, 0.577350269189625764509_wp, 0.774596669241483377036_wp, &
@@ -44,8 +45,9 @@ contains
 
     !> Nodes and weights of the Gauss-Legendre rule with np points on [-1, 1], nodes ascending:
     !> int_-1^1 f(x) dx = sum of weights(i) f(nodes(i)) for polynomials f of degree up to 2 np - 1.
-    !> Up to 10 points from a table; beyond, the eigenvalues of the tridiagonal Jacobi matrix (Golub and
-    !> Welsch) by LAPACK's `dstev`, polished by a Newton step, and weights from the derivative.
+    !> Rules of up to 10 points come from a table. For more points the nodes are the eigenvalues of the
+    !> tridiagonal Jacobi matrix (Golub and Welsch), by LAPACK's `dstev`, after one Newton step; the weights
+    !> come from the derivative of the Legendre polynomial.
     !> Errors: status_bad_count for np < 1, np > 1000 or arrays shorter than np, status_lapack_failed; nodes
     !> and weights are then 0. Elements beyond np are 0.
     !> Accuracy: nodes 1 epsilon, absolute; weights 1 epsilon, relative, up to 10 points and 8 epsilon from 11
@@ -79,61 +81,36 @@ contains
         integer, intent(out), optional :: stat     !! status_ok, status_bad_count, status_lapack_failed
         real(wp) :: value
         real(wp), allocatable :: nodes(:), weights(:)
-        real(wp) :: complement, rest
+        real(wp) :: complement, difference
         integer :: code, first, last
         logical :: valid
 
         value = ieee_value(1.0_wp, ieee_quiet_nan)
         code = status_ok
-        call check_arguments(phi1, phi2, n, k, kc2, nc, complement, rest, valid)
+        complement = modulus_complement(k, kc2)
+        difference = one_minus(n, nc)
+        valid = complement >= 0.0_wp .and. all(ieee_is_finite([phi1, phi2, difference]))
         if (np < 1 .or. np > most_points) then
             code = status_bad_count
         else if (np <= most_tabulated) then
             first = before(np) + 1
             last = before(np) + (np + 1)/2
-            if (valid) value = gauss_sum(phi1, phi2, complement, rest, np, tabulated_nodes(first:last), &
-                                         tabulated_weights(first:last))
+            if (valid) value = gauss_sum(phi1, phi2, complement, difference, np, &
+                                         tabulated_nodes(first:last), tabulated_weights(first:last))
         else
             allocate (nodes(np), weights(np))
             call fill_rule(np, nodes, weights, code)
             first = np/2 + 1
             if (valid .and. code == status_ok) then
                 ! the nodes >= 0 only, descending
-                value = gauss_sum(phi1, phi2, complement, rest, np, nodes(np:first:-1), weights(np:first:-1))
+                value = gauss_sum(phi1, phi2, complement, difference, np, nodes(np:first:-1), &
+                                  weights(np:first:-1))
             end if
         end if
         call conclude(code, 'eint_gauss', stat)
     end function eint_gauss
 
     ! ------------------------------------------------------------------------------------------ inner parts
-
-    !> 1 - k**2 and 1 - n, and whether the arguments are in the domain.
-    pure subroutine check_arguments(phi1, phi2, n, k, kc2, nc, complement, rest, valid)
-        real(wp), intent(in) :: phi1, phi2, n, k
-        real(wp), intent(in), optional :: kc2, nc
-        real(wp), intent(out) :: complement, rest
-        logical, intent(out) :: valid
-
-        complement = 1.0_wp
-        rest = 1.0_wp
-        valid = ieee_is_finite(phi1) .and. ieee_is_finite(phi2)
-        if (present(nc)) then
-            if (valid) valid = ieee_is_finite(nc)
-            if (valid) rest = nc
-        else
-            if (valid) valid = ieee_is_finite(n)
-            if (valid) rest = 1 - n
-        end if
-        if (present(kc2)) then
-            if (valid) valid = ieee_is_finite(kc2)
-            if (valid) valid = kc2 >= 0.0_wp .and. kc2 <= 1.0_wp
-            if (valid) complement = kc2
-        else
-            if (valid) valid = ieee_is_finite(k)
-            if (valid) valid = abs(k) <= 1.0_wp
-            if (valid) complement = (1 - k)*(1 + k)
-        end if
-    end subroutine check_arguments
 
     !> Sum over the nodes +-x of the integrand; a node x = 0 counts once.
     pure function gauss_sum(phi1, phi2, kc2, nc, np, nodes, weights) result(value)
@@ -161,7 +138,8 @@ contains
         end if
     end function gauss_sum
 
-    !> 1/((1 - n sin**2) sqrt(1 - k**2 sin**2)) as sums without cancellation; NaN outside its domain.
+    !> 1/(p sqrt(dd)) with p = 1 - n sin**2 and dd = 1 - k**2 sin**2 as sums without cancellation; NaN where
+    !> p or dd is not positive.
     pure function integrand(theta, kc2, nc) result(value)
         real(wp), intent(in) :: theta, kc2, nc
         real(wp) :: value
@@ -234,8 +212,8 @@ contains
             slope = np*(before_last - x*value)/((1 - x)*(1 + x))
             nodes(np + 1 - i) = x
             nodes(i) = -x
-            ! 2/((1 - x**2) P'**2) at the root itself, value/slope from the rounded x: the factor is its
-            ! logarithmic derivative there, which grows like np**2 towards the ends
+            ! 2/((1 - x**2) P'**2) at the root itself. The root is value/slope below the rounded x, and the
+            ! second line is the logarithmic derivative, which grows like np**2 towards the ends.
             weights(i) = 2/((1 - x)*(1 + x)*slope*slope)
             weights(i) = weights(i) + weights(i)*2*x*(value/slope)/((1 - x)*(1 + x))
             weights(np + 1 - i) = weights(i)
@@ -243,8 +221,8 @@ contains
     end subroutine fill_by_eigenvalues
 
     !> Legendre polynomials of degree np and np - 1 at x >= 0. The recurrence is carried by the differences,
-    !> j (P_j - P_(j-1)) = (j-1) (P_(j-1) - P_(j-2)) - (2j-1) (1-x) P_(j-1): the usual one acts like an error
-    !> in x, which near x = 1 is amplified by np**2.
+    !> j (P_j - P_(j-1)) = (j-1) (P_(j-1) - P_(j-2)) - (2j-1) (1-x) P_(j-1). Rounding in the usual recurrence
+    !> acts like an error in x, which near x = 1 grows by np**2.
     pure subroutine legendre_pair(np, x, value, before_last)
         integer, intent(in) :: np
         real(wp), intent(in) :: x
