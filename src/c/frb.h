@@ -45,7 +45,8 @@ enum {
     FRB_NO_PERIOD = 10,
     FRB_LAPACK_FAILED = 11,
     FRB_STOPPED = 12,
-    FRB_NOT_OFFERED = 13
+    FRB_NOT_OFFERED = 13,
+    FRB_TOO_ROUGH = 14
 };
 
 /* A body from its principal moments, in any order, or from its inertia tensor, 3 x 3, symmetric, about the centre of

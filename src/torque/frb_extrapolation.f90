@@ -264,6 +264,7 @@ contains
         if (h > reach .and. h < 5*reach) chosen = reach
     end function within_reach
 
+    !> Takes a step that was accepted into the report.
     pure subroutine note_step(told, h, error, last)
         type(extrapolation_report), intent(inout) :: told
         real(wp), intent(in) :: h, error
@@ -292,6 +293,7 @@ contains
         end if
     end subroutine state_of
 
+    !> Shows the state to the observer; `code` is that of the scene, or `status_stopped`.
     subroutine show(moved, scene, step, now, observer, code)
         type(extrapolated_body), intent(in) :: moved
         class(body_scene), intent(inout) :: scene
