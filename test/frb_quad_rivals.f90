@@ -31,6 +31,8 @@ module frb_quad_runge_kutta
 
     include '../app/charts/rivals/runge_kutta.inc'
 
+    include '../app/charts/rivals/dormand_prince.inc'
+
 end module frb_quad_runge_kutta
 
 module frb_quad_truth

@@ -4,13 +4,14 @@ program frb_charts
     use frb_chart_agreement, only: chart_agreement
     use frb_chart_cost, only: chart_cost, chart_speed
     use frb_chart_failure, only: chart_failure
+    use frb_chart_heavy_top, only: chart_heavy_top
     use frb_chart_orbits, only: chart_orbits, chart_racket
     use frb_chart_output, only: settings, give_up, say
     use frb_chart_precision, only: chart_work_precision, chart_growth
     use frb_chart_scale, only: chart_scale
     use frb_chart_scenes, only: chart_scenes
-    use frb_chart_top, only: chart_heavy_top, chart_torus
     use frb_chart_torque, only: chart_torque
+    use frb_chart_torus, only: chart_torus
     use frb_chart_triangle, only: chart_triangle
     use frb_chart_water, only: chart_water
     use frb_kinds, only: has_quad
@@ -116,7 +117,7 @@ contains
         call say('  scenes          table: which method for which scene')
         call say('  cost            time per step against step size, all methods')
         call say('  work-precision  error at t = 10 against time spent, three bodies')
-        call say('  heavy-top       the same with torque: schemes and drifts on three tops')
+        call say('  heavy-top       the same with torque, against time and torques; energy over long runs')
         call say('  torque          tables: cost of the splitting loop, the long run, runs there and back')
         call say('  failure         error against closeness to every place where methods fail')
         call say('  growth          error against the number of steps for the same time')

@@ -9,4 +9,6 @@ module frb_runge_kutta
     ! fpm does not watch included text: after a change of it, build afresh.
     include 'rivals/runge_kutta.inc'
 
+    include 'rivals/dormand_prince.inc'
+
 end module frb_runge_kutta
