@@ -196,7 +196,8 @@ contains
         call open_script(options, 'heavy-top-energy', 1000, 480, file)
         call file%put_lines([character(width) :: 'set multiplot layout 1,2', 'set logscale xy', &
             'set format x "10^{%T}"', 'set format y "10^{%T}"', 'set yrange [1e-16:1e-3]', &
-            'set xlabel "t"', 'set ylabel "largest error of the energy"', 'set key top left', 'set xrange [4:*]'])
+            'set xlabel "t"', 'set ylabel "largest error of the energy"', 'set key top left', &
+            'set xrange [4:*]'])
         do number = 1, 2
             top = one_top(number)
             call file%put('set title "'//trim(top%title)//'"')

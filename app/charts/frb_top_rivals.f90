@@ -17,7 +17,8 @@ contains
 
     include 'rivals/midpoint_lanes.inc'
 
-    !> The right-hand side, y = (m, q), of a top whose force acts at e3; constants: 1/I and the force in space.
+    !> The right-hand side, y = (m, q), of a top whose force acts at e3; constants: 1/I and the force in
+    !> space.
     pure subroutine rates(constants, y, dy)
         real(rk), intent(in) :: constants(6), y(7)
         real(rk), intent(out) :: dy(7)
