@@ -8,8 +8,9 @@ module frb_test_extrapolate
     use frb_scenes, only: heavy_top
     use frb_schemes, only: splitting_scheme
     use frb_splitting, only: integrate
-    use frb_status, only: status_ok, status_bad_attitude, status_bad_moments, status_bad_momentum, &
-        status_bad_option, status_bad_time, status_bad_torque, status_stopped, status_too_rough
+    use frb_status, only: status_ok, status_bad_attitude, status_bad_count, status_bad_moments, &
+        status_bad_momentum, status_bad_option, status_bad_time, status_bad_torque, status_stopped, &
+        status_too_rough
     use frb_torque, only: body_scene
     use frb_torque_cases, only: top_case, known_top, distance, recorder, pulsed_torque, spoilt_torque
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan, ieee_positive_inf
@@ -55,7 +56,7 @@ contains
     subroutine test_extrapolate(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('extrapolate', 119)
+        call t%open_suite('extrapolate', 123)
         call test_values(t)
         call test_order(t)
         call test_tolerances(t)
@@ -64,6 +65,7 @@ contains
         call test_torques(t)
         call test_axes(t)
         call test_observers(t)
+        call test_many(t)
         call test_refused(t)
         call t%close_suite()
     end subroutine test_extrapolate
@@ -402,6 +404,51 @@ contains
         call t%ok('and-keeps-the-state-it-saw', seen%count == 4 .and. abs(time - seen%t(4)) <= 0.0_wp &
                   .and. distance(m, q, seen%m(:, 4), seen%q(:, 4)) <= 0.0_wp)
     end subroutine test_observers
+
+    !> Many bodies: each as by itself, the others of one that is refused too.
+    subroutine test_many(t)
+        type(tally), intent(inout) :: t
+        type(top_case) :: item
+        type(rigid_body) :: bodies(3)
+        type(extrapolation_report) :: report, one
+        real(wp) :: m(3, 3), q(4, 3), m0(3, 3), m_one(3), q_one(4), time, apart
+        integer :: steps, i, stat
+
+        item = known_top(2)
+        do i = 1, 3
+            m0(:, i) = item%m0*(1 + 0.1_wp*i)
+            q(:, i) = item%q0
+            bodies(i) = rigid_body([0.6_wp, 0.8_wp, 1.0_wp + 0.1_wp*i])
+        end do
+        m = m0
+        time = 1.0_wp
+        call extrapolate(bodies, item%top, 3.0_wp, m, q, 1.0e-9_wp, t=time, stat=stat, report=report)
+        steps = 0
+        apart = 0.0_wp
+        do i = 1, 3
+            m_one = m0(:, i)
+            q_one = item%q0
+            call extrapolate(bodies(i), item%top, 3.0_wp, m_one, q_one, 1.0e-9_wp, t=time, report=one)
+            time = 1.0_wp
+            steps = steps + int(one%steps)
+            apart = max(apart, distance(m(:, i), q(:, i), m_one, q_one))
+        end do
+        call t%ok('many-bodies-move-each-as-by-itself', stat == status_ok .and. apart <= 0.0_wp)
+        call t%equal('steps-of-many-bodies-add-up', int(report%steps), steps)
+        m = m0
+        m(2, 2) = ieee_value(m0(1, 1), ieee_quiet_nan)
+        do i = 1, 3
+            q(:, i) = item%q0
+        end do
+        call extrapolate(item%body, item%top, 3.0_wp, m, q, 1.0e-9_wp, t=time, stat=stat)
+        m_one = m0(:, 3)
+        q_one = item%q0
+        call extrapolate(item%body, item%top, 3.0_wp, m_one, q_one, 1.0e-9_wp)
+        call t%ok('a-body-that-is-refused-does-not-keep-the-others', stat == status_bad_momentum &
+                  .and. distance(m(:, 3), q(:, 3), m_one, q_one) <= 0.0_wp .and. abs(time - 1.0_wp) <= 0.0_wp)
+        call extrapolate(bodies(1:2), item%top, 3.0_wp, m, q, 1.0e-9_wp, stat=stat)
+        call t%equal('two-bodies-for-three-states-are-refused', stat, status_bad_count)
+    end subroutine test_many
 
     !> Each input that can be wrong, with the state untouched.
     subroutine test_refused(t)

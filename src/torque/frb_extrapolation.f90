@@ -13,8 +13,8 @@ module frb_extrapolation
     use frb_free_flow, only: core_of, rigid_body
     use frb_kinds, only: wp
     use frb_rotations, only: is_unit_quat, norm3, quat_conjugate, quat_product, quat_rotate
-    use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_momentum, status_bad_option, &
-        status_bad_time, status_bad_torque, status_stopped, status_too_rough
+    use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_count, status_bad_momentum, &
+        status_bad_option, status_bad_time, status_bad_torque, status_stopped, status_too_rough
     use frb_torque, only: body_scene, body_observer
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
     use, intrinsic :: iso_fortran_env, only: int64
@@ -34,9 +34,7 @@ module frb_extrapolation
         real(wp) :: longest = 0.0_wp        !! longest step taken
     end type extrapolation_report
 
-contains
-
-    !> Moves one body under torque by `time` to a given accuracy, in place:
+    !> Moves a body under torque by `time` to a given accuracy, in place:
     !> `call extrapolate(body, scene, time, m, q, tolerance, t, observer, step, compensated, stat, report)`.
     !>
     !> `tolerance` bounds the estimated error of each step, relative to the largest entries of m and of q; any
@@ -66,7 +64,21 @@ contains
     !> (`status_bad_torque`) or so rough that 10 000 steps in a row are a millionth of what a smooth one would
     !> take (`status_too_rough`); a momentum along the axis of a linear rotor (`status_bad_momentum`); an
     !> observer (`status_stopped`; without `stat` the call then returns).
-    subroutine extrapolate(body, scene, time, m, q, tolerance, t, observer, step, compensated, stat, report)
+    !>
+    !> n bodies that do not see each other, all in the same scene: m is (3, n), q is (4, n), the body a scalar
+    !> or body(n), without an observer. Each takes steps of its own; one that is refused keeps the state it
+    !> got to, and the others go on.
+    interface extrapolate
+        module procedure extrapolate_body
+        module procedure extrapolate_alike
+        module procedure extrapolate_bodies
+    end interface extrapolate
+
+contains
+
+    !> One body.
+    subroutine extrapolate_body(body, scene, time, m, q, tolerance, t, observer, step, compensated, stat, &
+                                report)
         type(rigid_body), intent(in) :: body
         class(body_scene), intent(inout) :: scene                   !! the torque
         real(wp), intent(in) :: time                                !! how far, of either sign
@@ -107,7 +119,65 @@ contains
         ! An observer that stops a run has done what it was there for.
         if (code == status_stopped .and. .not. present(stat)) return
         call conclude(code, 'extrapolate', stat)
-    end subroutine extrapolate
+    end subroutine extrapolate_body
+
+    !> n bodies that are alike.
+    subroutine extrapolate_alike(body, scene, time, m, q, tolerance, t, step, compensated, stat, report)
+        type(rigid_body), intent(in) :: body
+        class(body_scene), intent(inout) :: scene
+        real(wp), intent(in) :: time
+        real(wp), contiguous, intent(inout) :: m(:, :), q(:, :)
+        real(wp), intent(in) :: tolerance
+        real(wp), intent(inout), optional :: t
+        real(wp), intent(in), optional :: step
+        logical, intent(in), optional :: compensated
+        integer, intent(out), optional :: stat
+        type(extrapolation_report), intent(out), optional :: report
+
+        call extrapolate_bodies([body], scene, time, m, q, tolerance, t, step, compensated, stat, report)
+    end subroutine extrapolate_alike
+
+    !> n bodies, one after another.
+    subroutine extrapolate_bodies(body, scene, time, m, q, tolerance, t, step, compensated, stat, report)
+        type(rigid_body), intent(in) :: body(:)                     !! n bodies, or one for all
+        class(body_scene), intent(inout) :: scene                   !! the torque on each
+        real(wp), intent(in) :: time
+        real(wp), contiguous, intent(inout) :: m(:, :)              !! angular momenta (3, n), body frames
+        real(wp), contiguous, intent(inout) :: q(:, :)              !! attitudes (4, n), unit quaternions
+        real(wp), intent(in) :: tolerance
+        real(wp), intent(inout), optional :: t                      !! goes on unless a body is refused
+        real(wp), intent(in), optional :: step
+        logical, intent(in), optional :: compensated
+        integer, intent(out), optional :: stat                      !! the first code that is not `status_ok`
+        type(extrapolation_report), intent(out), optional :: report !! sums, and extremes of all
+        type(extrapolation_report) :: one, told
+        real(wp) :: now
+        integer :: code, refused, i
+
+        code = status_bad_count
+        if (size(m, 1) == 3 .and. size(q, 1) == 4 .and. size(q, 2) == size(m, 2) &
+            .and. (size(body) == 1 .or. size(body) == size(m, 2))) code = status_ok
+        now = 0.0_wp
+        if (code == status_ok) then
+            do i = 1, size(m, 2)
+                now = 0.0_wp
+                if (present(t)) now = t
+                call extrapolate_body(body(min(i, size(body))), scene, time, m(:, i), q(:, i), tolerance, &
+                                      now, step=step, compensated=compensated, stat=refused, report=one)
+                if (code == status_ok) code = refused
+                told%torques = told%torques + one%torques
+                told%rejected = told%rejected + one%rejected
+                told%tolerance = max(told%tolerance, one%tolerance)
+                told%largest_error = max(told%largest_error, one%largest_error)
+                told%longest = max(told%longest, one%longest)
+                told%shortest = merge(one%shortest, min(told%shortest, one%shortest), told%steps == 0)
+                told%steps = told%steps + one%steps
+            end do
+            if (code == status_ok .and. present(t) .and. size(m, 2) > 0) t = now
+        end if
+        if (present(report)) report = told
+        call conclude(code, 'extrapolate', stat)
+    end subroutine extrapolate_bodies
 
     !> What is wrong with times and tolerance, if anything.
     pure function check_times(time, start, fixed, tolerance) result(code)
