@@ -18,6 +18,7 @@ program check
     use frb_test_steps, only: test_steps
     use frb_test_ode45, only: test_ode45
     use frb_test_step_laws, only: test_step_laws
+    use frb_test_step_orders, only: test_step_orders
     use frb_test_rivals, only: test_rivals
     use frb_test_files, only: test_files
     use frb_test_files_list, only: test_files_list
@@ -29,6 +30,7 @@ program check
     use frb_test_modified_kicks, only: test_modified_kicks
     use frb_test_drifts, only: test_drifts
     use frb_test_splitting, only: test_splitting
+    use frb_test_splitting_calls, only: test_splitting_calls
     use frb_test_groups, only: test_groups
     use frb_test_frames, only: test_frames
     use frb_test_open_loop, only: test_open_loop
@@ -36,7 +38,9 @@ program check
     use frb_test_quadrature, only: test_quadrature
     use frb_test_free_flow, only: test_free_flow
     use frb_test_flow_limits, only: test_flow_limits
+    use frb_test_flow_scales, only: test_flow_scales
     use frb_test_flow_laws, only: test_flow_laws
+    use frb_test_flow_accuracy, only: test_flow_accuracy
     use frb_test_flow_runs, only: test_flow_runs
     use frb_test_flow_batches, only: test_flow_batches
     use frb_test_flow_columns, only: test_flow_columns
@@ -90,6 +94,7 @@ contains
         call suite(task, 'steps', test_steps)
         call suite(task, 'ode45', test_ode45)
         call suite(task, 'step-laws', test_step_laws)
+        call suite(task, 'step-orders', test_step_orders)
         call suite(task, 'rivals', test_rivals)
         call suite(task, 'files', test_files)
         call suite(task, 'files-list', test_files_list)
@@ -101,6 +106,7 @@ contains
         call suite(task, 'extrapolate', test_extrapolate)
         call suite(task, 'drifts', test_drifts)
         call suite(task, 'splitting', test_splitting)
+        call suite(task, 'splitting-calls', test_splitting_calls)
         call suite(task, 'groups', test_groups)
         call suite(task, 'frames', test_frames)
         call suite(task, 'open-loop', test_open_loop)
@@ -108,7 +114,9 @@ contains
         call suite(task, 'quadrature', test_quadrature)
         call suite(task, 'free-flow', test_free_flow)
         call suite(task, 'flow-limits', test_flow_limits)
+        call suite(task, 'flow-scales', test_flow_scales)
         call suite(task, 'flow-laws', test_flow_laws)
+        call suite(task, 'flow-accuracy', test_flow_accuracy)
         call suite(task, 'flow-runs', test_flow_runs)
         call suite(task, 'flow-batches', test_flow_batches)
         call suite(task, 'flow-columns', test_flow_columns)

@@ -11,7 +11,7 @@ module frb_flow_samples
     implicit none
     private
 
-    public :: stream, true_case, advanced, settled, near_separatrix, defect, no_turn, no_rotation
+    public :: stream, true_case, advanced, settled, same, near_separatrix, defect, no_turn, no_rotation
 
     real(wp), parameter :: no_turn(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
     real(wp), parameter :: no_rotation(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, &
@@ -137,6 +137,15 @@ contains
         same = 1.0e30_wp
         if (all(ieee_is_finite(numbers))) same = numbers
     end function settled
+
+    !> Equal to the last bit, NaN and signs of zeros included.
+    pure function same(x, y) result(equal)
+        real(wp), intent(in) :: x(:), y(:)
+        logical :: equal
+
+        equal = size(x) == size(y)
+        if (equal) equal = all(transfer(x, [0_int64]) == transfer(y, [0_int64]))
+    end function same
 
     !> How far a state (m, q) is off the orbit of (m0, identity): norm of q, and relative to their size the
     !> norm of m, the energy, and the momentum in space. Everything finite and far from overflow.

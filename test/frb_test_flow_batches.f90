@@ -3,7 +3,7 @@
 module frb_test_flow_batches
     use, intrinsic :: iso_fortran_env, only: int64, output_unit
     use frb_checks, only: tally, largest, worst_of
-    use frb_flow_samples, only: stream, advanced, settled, defect, near_separatrix, no_turn, no_rotation
+    use frb_flow_samples, only: stream, advanced, settled, same, defect, near_separatrix, no_turn, no_rotation
     use frb_free_flow, only: free_flow, rigid_body
     use frb_kinds, only: wp, unit_roundoff
     use frb_rotations, only: norm3, quat_to_matrix
@@ -58,15 +58,6 @@ contains
             x = ieee_value(1.0_wp, ieee_negative_inf)
         end select
     end function not_a_number
-
-    !> Equal to the last bit, NaN included.
-    pure function same(x, y) result(equal)
-        real(wp), intent(in) :: x(:), y(:)
-        logical :: equal
-
-        equal = size(x) == size(y)
-        if (equal) equal = all(transfer(x, [0_int64]) == transfer(y, [0_int64]))
-    end function same
 
     !> Each status, principal body and tensor body, momentum alone, quaternion, matrix.
     subroutine check_refused(t)
