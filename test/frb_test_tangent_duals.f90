@@ -1,7 +1,8 @@
 !> flow_tangent against the closed form of the step differentiated by machine, in dual numbers.
 module frb_test_tangent_duals
     use frb_checks, only: tally
-    use frb_dual_flow, only: dual_step
+    use frb_dual_flow, only: dual_step, points
+    use frb_elliptic, only: gauss_legendre
     use frb_flow_samples, only: stream, no_turn
     use frb_free_flow, only: flow_tangent, rigid_body
     use frb_kinds, only: wp
@@ -18,16 +19,17 @@ contains
         type(stream) :: random
         real(wp) :: moments(3), m0(3), m(3), q(4), h, transition(6, 6), by_moments(6, 3), by_m(6, 3), &
             by_i(6, 3)
-        real(wp) :: worst(4)
+        real(wp) :: worst(4), nodes(points), weights(points)
         integer :: i
 
         call t%open_suite('tangent-duals', 4)
+        call gauss_legendre(points, nodes, weights)
         worst = 0.0_wp
         do i = 1, 500
             moments = random%triangle()
             m0 = random%direction()
             h = moments(1)*random%log_uniform(-3.0_wp, -0.7_wp)
-            call dual_step(moments, m0, h, by_m, by_i)
+            call dual_step(moments, m0, h, nodes, weights, by_m, by_i)
             m = m0
             q = no_turn
             call flow_tangent(rigid_body(moments), h, m, q, transition, by_moments)

@@ -10,7 +10,7 @@ charts_draw() {
         grep -q '^# columns: ' "$table"
         grep -vq '^#' "$table"
     done
-    for table in work-precision failure cost growth heavy-top heavy-top-weak heavy-top-energy triangle scale water orbits racket torus; do
+    for table in work-precision failure cost growth heavy-top heavy-top-weak heavy-top-energy triangle scale water orbits racket torus tangent; do
         [ -s "$work/charts/$table.svg" ] || ! command -v gnuplot
     done
     # Pictures a browser can show: well-formed, those of the README and those just drawn.

@@ -12,6 +12,7 @@ module frb_chart_failure
     private
 
     public :: chart_failure
+    public :: panels, names, titles, distances, new_failure_case, failed    ! for the chart `tangent`
 
     integer, parameter :: panels = 9
     character(*), parameter :: names(panels) = [character(12) :: 'separatrix', 'axis-1', 'axis-2', 'axis-3', &

@@ -10,6 +10,7 @@ program frb_charts
     use frb_chart_precision, only: chart_work_precision, chart_growth
     use frb_chart_scale, only: chart_scale
     use frb_chart_scenes, only: chart_scenes
+    use frb_chart_tangent, only: chart_tangent
     use frb_chart_torque, only: chart_torque
     use frb_chart_torus, only: chart_torus
     use frb_chart_triangle, only: chart_triangle
@@ -19,7 +20,8 @@ program frb_charts
     implicit none
 
     character(*), parameter :: names(*) = [character(16) :: 'speed', 'scenes', 'cost', 'work-precision', &
-        'heavy-top', 'torque', 'failure', 'growth', 'triangle', 'scale', 'water', 'orbits', 'agreement']
+        'heavy-top', 'torque', 'failure', 'growth', 'triangle', 'scale', 'water', 'orbits', 'tangent', &
+        'agreement']
     type(settings) :: options
     character(:), allocatable :: argument
     logical :: wanted(size(names))
@@ -84,6 +86,8 @@ program frb_charts
             call chart_triangle(options)
         case ('scale')
             call chart_scale(options)
+        case ('tangent')
+            call chart_tangent(options)
         case ('water')
             call chart_water(options)
         case ('orbits')
@@ -123,6 +127,7 @@ contains
         call say('  growth          error against the number of steps for the same time')
         call say('  triangle        error of one step h = 1 over all shapes of a body')
         call say('  scale           time per body against the number of bodies')
+        call say('  tangent         error of the derivative of a step against closeness to these places')
         call say('  water           energy of rigid water molecules: schemes, exact rotation and NO_SQUISH')
         call say('  orbits          polhodes, the tennis racket, the torus of a heavy top')
         call say('  agreement       check: measures cost twice, tells how many ratios agree within 15 %')
