@@ -27,6 +27,7 @@ program check
     use frb_test_agm, only: test_agm
     use frb_test_schemes, only: test_schemes
     use frb_test_extrapolate, only: test_extrapolate
+    use frb_test_extrapolate_torques, only: test_extrapolate_torques
     use frb_test_modified_kicks, only: test_modified_kicks
     use frb_test_drifts, only: test_drifts
     use frb_test_splitting, only: test_splitting
@@ -34,6 +35,8 @@ program check
     use frb_test_groups, only: test_groups
     use frb_test_frames, only: test_frames
     use frb_test_open_loop, only: test_open_loop
+    use frb_test_open_scenes, only: test_open_scenes
+    use frb_test_restarts, only: test_restarts
     use frb_test_legendre, only: test_legendre
     use frb_test_quadrature, only: test_quadrature
     use frb_test_free_flow, only: test_free_flow
@@ -43,6 +46,7 @@ program check
     use frb_test_flow_accuracy, only: test_flow_accuracy
     use frb_test_flow_runs, only: test_flow_runs
     use frb_test_flow_batches, only: test_flow_batches
+    use frb_test_flow_fuzz, only: test_flow_fuzz
     use frb_test_flow_columns, only: test_flow_columns
     use frb_test_flow_series, only: test_flow_series
     use frb_test_status, only: test_status, stop_in_the_library
@@ -104,12 +108,15 @@ contains
         call suite(task, 'schemes', test_schemes)
         call suite(task, 'modified-kicks', test_modified_kicks)
         call suite(task, 'extrapolate', test_extrapolate)
+        call suite(task, 'extrapolate-torques', test_extrapolate_torques)
         call suite(task, 'drifts', test_drifts)
         call suite(task, 'splitting', test_splitting)
         call suite(task, 'splitting-calls', test_splitting_calls)
         call suite(task, 'groups', test_groups)
         call suite(task, 'frames', test_frames)
         call suite(task, 'open-loop', test_open_loop)
+        call suite(task, 'open-scenes', test_open_scenes)
+        call suite(task, 'restarts', test_restarts)
         call suite(task, 'legendre', test_legendre)
         call suite(task, 'quadrature', test_quadrature)
         call suite(task, 'free-flow', test_free_flow)
@@ -119,6 +126,7 @@ contains
         call suite(task, 'flow-accuracy', test_flow_accuracy)
         call suite(task, 'flow-runs', test_flow_runs)
         call suite(task, 'flow-batches', test_flow_batches)
+        call suite(task, 'flow-fuzz', test_flow_fuzz)
         call suite(task, 'flow-columns', test_flow_columns)
         call suite(task, 'flow-series', test_flow_series)
         call suite(task, 'tangent', test_tangent)

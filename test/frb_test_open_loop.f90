@@ -1,22 +1,17 @@
-!> The open loop: loops of one's own against `integrate`, plans, scenes that refuse and agree, observers that
-!> stop, runs that are continued.
+!> The open loop: loops of one's own against `integrate`, plans, times.
 module frb_test_open_loop
     use frb_checks, only: tally, worst_of
     use frb_free_flow, only: free_flow, rigid_body
     use frb_invariants, only: kinetic_energy, spatial_momentum, total_energy
     use frb_kinds, only: wp
     use frb_rotations, only: quat_rotate, quat_to_matrix
-    use frb_scenes, only: heavy_top
     use frb_schemes, only: mirrored, scheme_names, splitting_scheme
     use frb_splitting, only: integrate
     use frb_splitting_plan, only: next_time, splitting_plan
-    use frb_status, only: status_ok, status_bad_attitude, status_bad_count, status_bad_momentum, &
-        status_bad_option, status_bad_scheme, status_bad_time, status_stopped
-    use frb_torque, only: body_scene
-    use frb_torque_cases, only: dipoles, distance, group_recorder, known_top, pulsed_torque, recorder, &
-        start_of_group, top_case
+    use frb_status, only: status_ok, status_bad_attitude, status_bad_option, status_bad_scheme, &
+        status_bad_time
+    use frb_torque_cases, only: dipoles, distance, known_top, start_of_group, top_case
     use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_value, ieee_quiet_nan
-    use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
@@ -24,75 +19,19 @@ module frb_test_open_loop
 
     real(wp), parameter :: eps = epsilon(1.0_wp)
     integer, parameter :: n = 7, names = size(scheme_names)
-    integer, parameter :: own_code = 77         ! of a scene of the user's
-
-    !> A heavy top that counts, refuses on demand, and hears of the refusals of others.
-    type, extends(body_scene) :: shared_top
-        type(heavy_top) :: top
-        integer :: asked = 0                    ! torques so far
-        integer :: agreed = 0                   ! calls of the hook so far
-        integer :: refuse_at = 0                ! torque that is refused
-        integer :: others_refuse_at = 0         ! call of the hook at which another process refuses
-        integer :: last_code = 0                ! what the hook came with
-    contains
-        procedure :: torque => shared_torque
-        procedure :: agree => shared_agree
-    end type shared_top
-
-    !> The same of dipoles.
-    type, extends(dipoles) :: shared_dipoles
-        integer :: agreed = 0
-        integer :: others_refuse_at = 0
-    contains
-        procedure :: agree => dipoles_agree
-    end type shared_dipoles
 
 contains
 
     subroutine test_open_loop(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('open-loop', 103)
+        call t%open_suite('open-loop', 44)
         call test_own_loop(t)
         call test_plans(t)
-        call test_refusing_scenes(t)
-        call test_agreeing(t)
-        call test_stopping(t)
-        call test_restarts(t)
-        call test_restarted_groups(t)
-        call test_joined(t)
         call test_times(t)
         call test_units_and_sizes(t)
         call t%close_suite()
     end subroutine test_open_loop
-
-    subroutine shared_torque(self, q, t, tau, stat)
-        class(shared_top), intent(inout) :: self
-        real(wp), intent(in) :: q(4), t
-        real(wp), intent(out) :: tau(3)
-        integer, intent(out) :: stat
-
-        call self%top%torque(q, t, tau, stat)
-        self%asked = self%asked + 1
-        if (self%asked == self%refuse_at) stat = own_code
-    end subroutine shared_torque
-
-    subroutine shared_agree(self, code)
-        class(shared_top), intent(inout) :: self
-        integer, intent(inout) :: code
-
-        self%agreed = self%agreed + 1
-        self%last_code = code
-        if (self%agreed == self%others_refuse_at) code = max(code, own_code)
-    end subroutine shared_agree
-
-    subroutine dipoles_agree(self, code)
-        class(shared_dipoles), intent(inout) :: self
-        integer, intent(inout) :: code
-
-        self%agreed = self%agreed + 1
-        if (self%agreed == self%others_refuse_at) code = max(code, own_code)
-    end subroutine dipoles_agree
 
     !> The recipe of splitting_plan, one body and many, every scheme with plain kicks; the torque kept where
     !> nothing moves.
@@ -198,295 +137,6 @@ contains
         plan = splitting_plan(splitting_scheme('none'), 0.1_wp)
         call t%equal('a-plan-says-what-the-scheme-says', plan%status, status_bad_option)
     end subroutine test_plans
-
-    !> A torque that refuses ends the run with the last whole step, in any stage of any scheme.
-    subroutine test_refusing_scenes(t)
-        type(tally), intent(inout) :: t
-        type(top_case) :: item
-        type(splitting_scheme) :: scheme
-        type(shared_top) :: scene
-        real(wp) :: m(3), q(4), time, m_short(3), q_short(4), t_short
-        integer :: k, i, stat, done
-        logical :: good
-
-        item = known_top(2)
-        do k = 1, names
-            scheme = splitting_scheme(trim(scheme_names(k)))
-            good = .true.
-            do i = 1, 40
-                scene = shared_top(top=item%top, refuse_at=i)
-                m = item%m0
-                q = item%q0
-                time = 1.0_wp
-                call integrate(item%body, scheme, scene, 0.05_wp, 50, m, q, t=time, stat=stat)
-                done = nint((time - 1)/0.05_wp)
-                m_short = item%m0
-                q_short = item%q0
-                t_short = 1.0_wp
-                scene = shared_top(top=item%top)
-                call integrate(item%body, scheme, scene, 0.05_wp, done, m_short, q_short, t=t_short)
-                good = good .and. stat == own_code .and. done < i .and. all(abs(m - m_short) <= 0.0_wp) &
-                       .and. all(abs(q - q_short) <= 0.0_wp) .and. abs(time - t_short) <= 0.0_wp
-                ! Not a whole step more was possible: that one asks for the torque that is refused.
-                scene = shared_top(top=item%top)
-                call integrate(item%body, scheme, scene, 0.05_wp, done + 1, m_short, q_short)
-                good = good .and. scene%asked >= i - done*scheme%stages()
-            end do
-            call t%ok(trim(scheme_names(k))//'-ends-with-the-last-whole-step-before-a-refusal', good)
-        end do
-    end subroutine test_refusing_scenes
-
-    !> The hook hears every code before it counts, and what it says ends the run.
-    subroutine test_agreeing(t)
-        type(tally), intent(inout) :: t
-        type(top_case) :: item
-        type(splitting_scheme) :: scheme
-        type(shared_top) :: scene
-        type(shared_dipoles) :: group
-        type(rigid_body) :: body(n)
-        type(recorder) :: seen
-        real(wp) :: m(3), q(4), time, ms(3, n), qs(4, n), ms_start(3, n), qs_start(4, n)
-        integer :: i, stat, calls, ended
-        logical :: good
-
-        item = known_top(2)
-        scheme = splitting_scheme('srkn14')
-        scene = shared_top(top=item%top)
-        m = item%m0
-        q = item%q0
-        call integrate(item%body, scheme, scene, 0.05_wp, 4, m, q, seen)
-        calls = scene%agreed
-        ! At the start, after each torque, at the end of each step, after each state shown.
-        call t%equal('the-hook-is-asked-wherever-a-run-may-end', calls, 1 + 4*14 + 4 + 5)
-        good = .true.
-        do i = 1, calls
-            scene = shared_top(top=item%top, others_refuse_at=i)
-            m = item%m0
-            q = item%q0
-            time = 0.0_wp
-            call integrate(item%body, scheme, scene, 0.05_wp, 4, m, q, seen, t=time, stat=stat)
-            good = good .and. stat == own_code .and. scene%agreed == i
-        end do
-        call t%ok('a-run-ends-where-another-process-refuses', good)
-        scene = shared_top(top=item%top, refuse_at=30)
-        call integrate(item%body, scheme, scene, 0.05_wp, 4, m, q, stat=stat)
-        call t%equal('the-hook-hears-what-the-torque-said', scene%last_code, own_code)
-        scene = shared_top(top=item%top)
-        call integrate(item%body, scheme, scene, 0.0_wp, 4, m, q, stat=stat)
-        call t%ok('the-hook-hears-of-refused-input', scene%last_code == status_bad_time &
-                  .and. scene%agreed == 1)
-        scene = shared_top(top=item%top)
-        seen%stop_at = 1
-        call integrate(item%body, scheme, scene, 0.05_wp, 4, m, q, seen, stat=stat)
-        call t%equal('the-hook-hears-of-an-observer-that-stops', scene%last_code, status_stopped)
-
-        call start_of_group(body, ms_start, qs_start)
-        ms = ms_start
-        qs = qs_start
-        call integrate(body, scheme, group, 0.05_wp, 4, ms, qs)
-        call t%equal('so-is-the-hook-of-a-group', group%agreed, 1 + 4*14 + 4)
-        good = .true.
-        ended = group%agreed
-        do i = 1, ended
-            group%agreed = 0
-            group%others_refuse_at = i
-            ms = ms_start
-            qs = qs_start
-            call integrate(body, scheme, group, 0.05_wp, 4, ms, qs, stat=stat)
-            good = good .and. stat == own_code .and. group%agreed == i
-        end do
-        call t%ok('a-group-ends-where-another-process-refuses', good)
-    end subroutine test_agreeing
-
-    !> An observer ends a run.
-    subroutine test_stopping(t)
-        type(tally), intent(inout) :: t
-        type(top_case) :: item
-        type(splitting_scheme) :: scheme
-        type(recorder) :: seen
-        type(group_recorder) :: group_seen
-        type(dipoles) :: scene
-        type(rigid_body) :: body(n)
-        real(wp) :: m(3), q(4), time, m_short(3), q_short(4), ms(3, n), qs(4, n)
-        integer :: k, stat
-
-        item = known_top(2)
-        do k = 1, 2
-            scheme = splitting_scheme(trim(merge('srkn14', 'srkn11', k == 1)))
-            m = item%m0
-            q = item%q0
-            m_short = m
-            q_short = q
-            time = 2.0_wp
-            seen%count = 0
-            seen%stop_at = 14
-            call integrate(item%body, scheme, item%top, 0.05_wp, 1000000000000_int64, m, q, seen, every=7, &
-                           t=time, stat=stat)
-            call integrate(item%body, scheme, item%top, 0.05_wp, 14, m_short, q_short)
-            call t%ok('an-observer-ends-a-run-with-the-state-it-sees', stat == status_stopped &
-                      .and. seen%count == 3 .and. all(abs([m - m_short, m - seen%m(:, 3)]) <= 0.0_wp) &
-                      .and. all(abs([q - q_short, q - seen%q(:, 3)]) <= 0.0_wp) &
-                      .and. abs(time - seen%t(3)) <= 0.0_wp .and. abs(time - 2.7_wp) <= 2*eps)
-        end do
-        seen%count = 0
-        seen%stop_at = 0
-        m = item%m0
-        q = item%q0
-        call integrate(item%body, scheme, item%top, 0.05_wp, 10, m, q, seen, stat=stat)
-        call t%ok('before-the-first-step-if-it-likes', stat == status_stopped .and. seen%count == 1 &
-                  .and. all(abs(m - item%m0) <= 0.0_wp))
-        seen%stop_at = 3
-        call integrate(item%body, scheme, item%top, 0.05_wp, 10, m, q, seen)
-        call t%equal('without-stat-a-stopped-run-returns', seen%count, 5)
-        call start_of_group(body, ms, qs)
-        group_seen%stop_at = 4
-        call integrate(body, scheme, scene, 0.05_wp, 10, ms, qs, group_seen, every=2, stat=stat)
-        call t%ok('an-observer-ends-the-run-of-a-group', stat == status_stopped .and. group_seen%step == 4 &
-                  .and. all(abs(ms - group_seen%m) <= 0.0_wp))
-    end subroutine test_stopping
-
-    !> A run in pieces is the run in one, to the last bit: every scheme, plain and compensated, a torque that
-    !> depends on time.
-    subroutine test_restarts(t)
-        type(tally), intent(inout) :: t
-        integer, parameter :: pieces(4) = [1, 13, 40, 17]
-        real(wp), parameter :: h(2) = [0.037_wp, -0.1_wp/3]
-        type(top_case) :: item
-        type(splitting_scheme) :: scheme
-        type(pulsed_torque) :: pulse
-        real(wp) :: m(3, 2), q(4, 2), rests(7, 2), time(2)
-        integer :: i, j, k, mode
-        logical :: same(2)
-
-        item = known_top(2)
-        do k = 1, names
-            scheme = splitting_scheme(trim(scheme_names(k)))
-            same = .true.
-            do mode = 1, 2
-                do j = 1, 2
-                    m = spread(item%m0, 2, 2)
-                    q = spread(item%q0, 2, 2)
-                    time = 0.6_wp
-                    rests = 0.0_wp
-                    call run(sum(pieces), 1)
-                    do i = 1, size(pieces)
-                        call run(pieces(i), 2)
-                    end do
-                    same(mode) = same(mode) .and. all(abs(m(:, 1) - m(:, 2)) <= 0.0_wp) &
-                                 .and. all(abs(q(:, 1) - q(:, 2)) <= 0.0_wp) &
-                                 .and. abs(time(1) - time(2)) <= 0.0_wp &
-                                 .and. all(abs(rests(:, 1) - rests(:, 2)) <= 0.0_wp)
-                end do
-            end do
-            call t%ok(trim(scheme_names(k))//'-goes-on-to-the-bit', same(1))
-            call t%ok(trim(scheme_names(k))//'-compensated-goes-on-to-the-bit', same(2))
-        end do
-
-    contains
-
-        !> The heavy top, or for negative steps the torque that depends on time.
-        subroutine run(steps, which)
-            integer, intent(in) :: steps, which
-
-            if (h(j) > 0.0_wp) then
-                call integrate(item%body, scheme, item%top, h(j), steps, m(:, which), q(:, which), &
-                               t=time(which), compensated=mode == 2, rests=rests(:, which))
-            else
-                call integrate(item%body, scheme, pulse, h(j), steps, m(:, which), q(:, which), &
-                               t=time(which), compensated=mode == 2, rests=rests(:, which))
-            end if
-        end subroutine run
-
-    end subroutine test_restarts
-
-    !> The same of groups.
-    subroutine test_restarted_groups(t)
-        type(tally), intent(inout) :: t
-        type(rigid_body) :: body(n)
-        type(dipoles) :: scene
-        type(splitting_scheme) :: scheme
-        real(wp) :: m(3, n, 2), q(4, n, 2), rests(7, n, 2), time(2)
-        integer :: k, mode, stat
-        logical :: same(2)
-
-        same = .true.
-        do k = 1, names
-            scheme = splitting_scheme(trim(scheme_names(k)))
-            do mode = 1, 2
-                call start_of_group(body, m(:, :, 1), q(:, :, 1))
-                m(:, :, 2) = m(:, :, 1)
-                q(:, :, 2) = q(:, :, 1)
-                time = 0.1_wp
-                rests = 0.0_wp
-                call integrate(body, scheme, scene, 0.03_wp, 30, m(:, :, 1), q(:, :, 1), t=time(1), &
-                               compensated=mode == 2, rests=rests(:, :, 1))
-                call integrate(body, scheme, scene, 0.03_wp, 11, m(:, :, 2), q(:, :, 2), t=time(2), &
-                               compensated=mode == 2, rests=rests(:, :, 2))
-                call integrate(body, scheme, scene, 0.03_wp, 19, m(:, :, 2), q(:, :, 2), t=time(2), &
-                               compensated=mode == 2, rests=rests(:, :, 2))
-                same(mode) = same(mode) .and. all(abs(m(:, :, 1) - m(:, :, 2)) <= 0.0_wp) &
-                             .and. all(abs(q(:, :, 1) - q(:, :, 2)) <= 0.0_wp) &
-                             .and. all(abs(rests(:, :, 1) - rests(:, :, 2)) <= 0.0_wp) &
-                             .and. abs(time(1) - time(2)) <= 0.0_wp
-            end do
-        end do
-        call t%ok('groups-go-on-to-the-bit', same(1))
-        call t%ok('compensated-groups-go-on-to-the-bit', same(2))
-        call t%ok('a-compensated-group-has-rests', maxval(abs(rests)) > 0.0_wp)
-        call integrate(body, scheme, scene, 0.03_wp, 1, m(:, :, 1), q(:, :, 1), compensated=.true., &
-                       rests=rests(1:6, :, 1), stat=stat)
-        call t%equal('rests-of-another-size-are-refused', stat, status_bad_count)
-        rests(3, 2, 1) = ieee_value(1.0_wp, ieee_quiet_nan)
-        call integrate(body, scheme, scene, 0.03_wp, 1, m(:, :, 1), q(:, :, 1), compensated=.true., &
-                       rests=rests(:, :, 1), stat=stat)
-        call t%equal('rests-that-are-nan-are-refused', stat, status_bad_momentum)
-    end subroutine test_restarted_groups
-
-    !> Drifts of two steps as one: the same run to rounding, one drift less a step.
-    subroutine test_joined(t)
-        type(tally), intent(inout) :: t
-        type(top_case) :: item
-        type(splitting_scheme) :: scheme
-        type(recorder) :: seen
-        type(shared_top) :: scene
-        real(wp) :: m(3), q(4), m_joined(3), q_joined(4), time, worst(3)
-        integer :: k, stat, done
-
-        item = known_top(2)
-        worst = 0.0_wp
-        do k = 1, names
-            scheme = splitting_scheme(trim(scheme_names(k)))
-            m = item%m0
-            q = item%q0
-            call integrate(item%body, scheme, item%top, 0.05_wp, 40, m, q)
-            m_joined = item%m0
-            q_joined = item%q0
-            call integrate(item%body, scheme, item%top, 0.05_wp, 40, m_joined, q_joined, joined=.true.)
-            worst(1) = worst_of(worst(1), distance(m, q, m_joined, q_joined))
-            m_joined = item%m0
-            q_joined = item%q0
-            seen%count = 0
-            call integrate(item%body, scheme, item%top, 0.05_wp, 40, m_joined, q_joined, seen, every=8, &
-                           joined=.true.)
-            worst(2) = worst_of(worst(2), distance(m, q, seen%m(:, 6), seen%q(:, 6)))
-            ! Ended by a refusal it is closed: the state is that of a whole step.
-            scene = shared_top(top=item%top, refuse_at=37)
-            m_joined = item%m0
-            q_joined = item%q0
-            time = 0.0_wp
-            call integrate(item%body, scheme, scene, 0.05_wp, 40, m_joined, q_joined, t=time, joined=.true., &
-                           stat=stat)
-            done = nint(time/0.05_wp)
-            m = item%m0
-            q = item%q0
-            scene = shared_top(top=item%top)
-            call integrate(item%body, scheme, scene, 0.05_wp, done, m, q)
-            worst(3) = worst_of(worst(3), distance(m, q, m_joined, q_joined))
-        end do
-        call t%at_most('joined-drifts-make-the-same-run', worst(1), 128*eps)
-        call t%at_most('joined-runs-show-whole-steps', worst(2), 128*eps)
-        call t%at_most('joined-runs-end-with-whole-steps', worst(3), 128*eps)
-    end subroutine test_joined
 
     !> Times of steps, from any start, stay with start + steps*h; after 2**53 steps of h they stand.
     subroutine test_times(t)

@@ -1,0 +1,227 @@
+!> The open loop: scenes that refuse and agree, torques counted where drifts are joined.
+module frb_test_open_scenes
+    use frb_checks, only: tally, worst_of
+    use frb_free_flow, only: rigid_body
+    use frb_kinds, only: wp
+    use frb_scenes, only: heavy_top
+    use frb_schemes, only: scheme_names, splitting_scheme
+    use frb_splitting, only: integrate
+    use frb_status, only: status_bad_time, status_stopped
+    use frb_torque, only: body_scene
+    use frb_torque_cases, only: dipoles, distance, known_top, recorder, start_of_group, top_case
+    implicit none
+    private
+
+    public :: test_open_scenes
+
+    real(wp), parameter :: eps = epsilon(1.0_wp)
+    integer, parameter :: n = 7, names = size(scheme_names)
+    integer, parameter :: own_code = 77         ! of a scene of the user's
+
+    !> A heavy top that counts, refuses on demand, and hears of the refusals of others.
+    type, extends(body_scene) :: shared_top
+        type(heavy_top) :: top
+        integer :: asked = 0                    ! torques so far
+        integer :: agreed = 0                   ! calls of the hook so far
+        integer :: refuse_at = 0                ! torque that is refused
+        integer :: others_refuse_at = 0         ! call of the hook at which another process refuses
+        integer :: last_code = 0                ! what the hook came with
+    contains
+        procedure :: torque => shared_torque
+        procedure :: agree => shared_agree
+    end type shared_top
+
+    !> The same of dipoles.
+    type, extends(dipoles) :: shared_dipoles
+        integer :: agreed = 0
+        integer :: others_refuse_at = 0
+    contains
+        procedure :: agree => dipoles_agree
+    end type shared_dipoles
+
+contains
+
+    subroutine test_open_scenes(t)
+        type(tally), intent(inout) :: t
+
+        call t%open_suite('open-scenes', 23)
+        call test_refusing_scenes(t)
+        call test_agreeing(t)
+        call test_joined(t)
+        call t%close_suite()
+    end subroutine test_open_scenes
+
+    subroutine shared_torque(self, q, t, tau, stat)
+        class(shared_top), intent(inout) :: self
+        real(wp), intent(in) :: q(4), t
+        real(wp), intent(out) :: tau(3)
+        integer, intent(out) :: stat
+
+        call self%top%torque(q, t, tau, stat)
+        self%asked = self%asked + 1
+        if (self%asked == self%refuse_at) stat = own_code
+    end subroutine shared_torque
+
+    subroutine shared_agree(self, code)
+        class(shared_top), intent(inout) :: self
+        integer, intent(inout) :: code
+
+        self%agreed = self%agreed + 1
+        self%last_code = code
+        if (self%agreed == self%others_refuse_at) code = max(code, own_code)
+    end subroutine shared_agree
+
+    subroutine dipoles_agree(self, code)
+        class(shared_dipoles), intent(inout) :: self
+        integer, intent(inout) :: code
+
+        self%agreed = self%agreed + 1
+        if (self%agreed == self%others_refuse_at) code = max(code, own_code)
+    end subroutine dipoles_agree
+
+    !> A torque that refuses ends the run with the last whole step, in any stage of any scheme.
+    subroutine test_refusing_scenes(t)
+        type(tally), intent(inout) :: t
+        type(top_case) :: item
+        type(splitting_scheme) :: scheme
+        type(shared_top) :: scene
+        real(wp) :: m(3), q(4), time, m_short(3), q_short(4), t_short
+        integer :: k, i, stat, done
+        logical :: good
+
+        item = known_top(2)
+        do k = 1, names
+            scheme = splitting_scheme(trim(scheme_names(k)))
+            good = .true.
+            do i = 1, 40
+                scene = shared_top(top=item%top, refuse_at=i)
+                m = item%m0
+                q = item%q0
+                time = 1.0_wp
+                call integrate(item%body, scheme, scene, 0.05_wp, 50, m, q, t=time, stat=stat)
+                done = nint((time - 1)/0.05_wp)
+                m_short = item%m0
+                q_short = item%q0
+                t_short = 1.0_wp
+                scene = shared_top(top=item%top)
+                call integrate(item%body, scheme, scene, 0.05_wp, done, m_short, q_short, t=t_short)
+                good = good .and. stat == own_code .and. done < i .and. all(abs(m - m_short) <= 0.0_wp) &
+                       .and. all(abs(q - q_short) <= 0.0_wp) .and. abs(time - t_short) <= 0.0_wp
+                ! Not a whole step more was possible: that one asks for the torque that is refused.
+                scene = shared_top(top=item%top)
+                call integrate(item%body, scheme, scene, 0.05_wp, done + 1, m_short, q_short)
+                good = good .and. scene%asked >= i - done*scheme%stages()
+            end do
+            call t%ok(trim(scheme_names(k))//'-ends-with-the-last-whole-step-before-a-refusal', good)
+        end do
+    end subroutine test_refusing_scenes
+
+    !> The hook hears every code before it counts, and what it says ends the run.
+    subroutine test_agreeing(t)
+        type(tally), intent(inout) :: t
+        type(top_case) :: item
+        type(splitting_scheme) :: scheme
+        type(shared_top) :: scene
+        type(shared_dipoles) :: group
+        type(rigid_body) :: body(n)
+        type(recorder) :: seen
+        real(wp) :: m(3), q(4), time, ms(3, n), qs(4, n), ms_start(3, n), qs_start(4, n)
+        integer :: i, stat, calls, ended
+        logical :: good
+
+        item = known_top(2)
+        scheme = splitting_scheme('srkn14')
+        scene = shared_top(top=item%top)
+        m = item%m0
+        q = item%q0
+        call integrate(item%body, scheme, scene, 0.05_wp, 4, m, q, seen)
+        calls = scene%agreed
+        ! At the start, after each torque, at the end of each step, after each state shown.
+        call t%equal('the-hook-is-asked-wherever-a-run-may-end', calls, 1 + 4*14 + 4 + 5)
+        good = .true.
+        do i = 1, calls
+            scene = shared_top(top=item%top, others_refuse_at=i)
+            m = item%m0
+            q = item%q0
+            time = 0.0_wp
+            call integrate(item%body, scheme, scene, 0.05_wp, 4, m, q, seen, t=time, stat=stat)
+            good = good .and. stat == own_code .and. scene%agreed == i
+        end do
+        call t%ok('a-run-ends-where-another-process-refuses', good)
+        scene = shared_top(top=item%top, refuse_at=30)
+        call integrate(item%body, scheme, scene, 0.05_wp, 4, m, q, stat=stat)
+        call t%equal('the-hook-hears-what-the-torque-said', scene%last_code, own_code)
+        scene = shared_top(top=item%top)
+        call integrate(item%body, scheme, scene, 0.0_wp, 4, m, q, stat=stat)
+        call t%ok('the-hook-hears-of-refused-input', scene%last_code == status_bad_time &
+                  .and. scene%agreed == 1)
+        scene = shared_top(top=item%top)
+        seen%stop_at = 1
+        call integrate(item%body, scheme, scene, 0.05_wp, 4, m, q, seen, stat=stat)
+        call t%equal('the-hook-hears-of-an-observer-that-stops', scene%last_code, status_stopped)
+
+        call start_of_group(body, ms_start, qs_start)
+        ms = ms_start
+        qs = qs_start
+        call integrate(body, scheme, group, 0.05_wp, 4, ms, qs)
+        call t%equal('so-is-the-hook-of-a-group', group%agreed, 1 + 4*14 + 4)
+        good = .true.
+        ended = group%agreed
+        do i = 1, ended
+            group%agreed = 0
+            group%others_refuse_at = i
+            ms = ms_start
+            qs = qs_start
+            call integrate(body, scheme, group, 0.05_wp, 4, ms, qs, stat=stat)
+            good = good .and. stat == own_code .and. group%agreed == i
+        end do
+        call t%ok('a-group-ends-where-another-process-refuses', good)
+    end subroutine test_agreeing
+
+    !> Drifts of two steps as one: the same run to rounding, one drift less a step.
+    subroutine test_joined(t)
+        type(tally), intent(inout) :: t
+        type(top_case) :: item
+        type(splitting_scheme) :: scheme
+        type(recorder) :: seen
+        type(shared_top) :: scene
+        real(wp) :: m(3), q(4), m_joined(3), q_joined(4), time, worst(3)
+        integer :: k, stat, done
+
+        item = known_top(2)
+        worst = 0.0_wp
+        do k = 1, names
+            scheme = splitting_scheme(trim(scheme_names(k)))
+            m = item%m0
+            q = item%q0
+            call integrate(item%body, scheme, item%top, 0.05_wp, 40, m, q)
+            m_joined = item%m0
+            q_joined = item%q0
+            call integrate(item%body, scheme, item%top, 0.05_wp, 40, m_joined, q_joined, joined=.true.)
+            worst(1) = worst_of(worst(1), distance(m, q, m_joined, q_joined))
+            m_joined = item%m0
+            q_joined = item%q0
+            seen%count = 0
+            call integrate(item%body, scheme, item%top, 0.05_wp, 40, m_joined, q_joined, seen, every=8, &
+                           joined=.true.)
+            worst(2) = worst_of(worst(2), distance(m, q, seen%m(:, 6), seen%q(:, 6)))
+            ! Ended by a refusal it is closed: the state is that of a whole step.
+            scene = shared_top(top=item%top, refuse_at=37)
+            m_joined = item%m0
+            q_joined = item%q0
+            time = 0.0_wp
+            call integrate(item%body, scheme, scene, 0.05_wp, 40, m_joined, q_joined, t=time, joined=.true., &
+                           stat=stat)
+            done = nint(time/0.05_wp)
+            m = item%m0
+            q = item%q0
+            scene = shared_top(top=item%top)
+            call integrate(item%body, scheme, scene, 0.05_wp, done, m, q)
+            worst(3) = worst_of(worst(3), distance(m, q, m_joined, q_joined))
+        end do
+        call t%at_most('joined-drifts-make-the-same-run', worst(1), 128*eps)
+        call t%at_most('joined-runs-show-whole-steps', worst(2), 128*eps)
+        call t%at_most('joined-runs-end-with-whole-steps', worst(3), 128*eps)
+    end subroutine test_joined
+
+end module frb_test_open_scenes
