@@ -1,4 +1,4 @@
-!> The one real kind of the library, the constants that belong to it, and the kind of what checks it.
+!> The real kind of the library and constants of this kind; quadruple precision for tests and charts.
 module frb_kinds
     use, intrinsic :: iso_fortran_env, only: real64, real128
     implicit none
@@ -9,8 +9,8 @@ module frb_kinds
     !> Working precision: IEEE double.
     integer, parameter :: wp = real64
 
-    !> Quadruple precision, for the truth of tests and charts; `wp` again where the compiler has none: checks
-    !> that need 30 digits ask `has_quad`.
+    !> Quadruple precision, for the exact values in tests and charts. It is `wp` where the compiler has no
+    !> quadruple precision: checks that need 30 digits ask `has_quad`.
     integer, parameter :: qp = merge(real128, real64, real128 > 0)
     logical, parameter :: has_quad = precision(1.0_qp) >= 30
 

@@ -13,7 +13,7 @@ module frb_rotations
     public :: cross, norm3, quat_product, quat_conjugate, quat_rotate, quat_to_matrix, matrix_to_quat, &
         quat_along, is_unit_quat, unit_tolerance
 
-    !> How far from one the norm of a quaternion may be where it must be one.
+    !> A quaternion whose norm must be one may miss one by this much.
     real(wp), parameter :: unit_tolerance = 1.0e-6_wp
 
 contains
@@ -42,9 +42,9 @@ contains
         end if
     end function norm3
 
-    !> Hamilton product p q. The vector part of q times its conjugate is exactly zero, in fused arithmetic
-    !> too: parentheses keep a compiler from contracting a product into a sum, which would round the two
-    !> halves of a difference differently.
+    !> Hamilton product p q. The product of q and its conjugate has a vector part of exactly zero, in fused
+    !> arithmetic too: parentheses keep a compiler from fusing a product with a sum, which would round equal
+    !> products of opposite sign differently.
     pure function quat_product(p, q) result(pq)
         real(wp), intent(in) :: p(4), q(4)
         real(wp) :: pq(4)
@@ -63,9 +63,9 @@ contains
         conjugate = [q(1), -q(2), -q(3), -q(4)]
     end function quat_conjugate
 
-    !> Whether q can stand for an attitude where that must have norm one: finite, | |q| - 1 | at most 1e-6.
-    !> Every routine of the library that needs a unit quaternion asks this and refuses others: by its `stat`,
-    !> `status_bad_attitude`, or with NaN. What takes any norm says so.
+    !> Whether q is a unit quaternion: finite, | |q| - 1 | at most 1e-6. Every routine of the library that
+    !> needs a unit quaternion asks this and refuses others, with `status_bad_attitude` or with NaN. Routines
+    !> that take any norm say so.
     pure function is_unit_quat(q) result(good)
         real(wp), intent(in) :: q(4)
         logical :: good
@@ -130,8 +130,8 @@ contains
         q = ieee_value(1.0_wp, ieee_quiet_nan)
     end function matrix_to_quat
 
-    !> A quaternion of any sign, and of a norm from 1 to 4, of a rotation matrix. Its largest component is
-    !> formed as a sum, or one nearly as large, so no digits are lost at any attitude.
+    !> A quaternion of a rotation matrix, of any sign and of a norm from 1 to 4. Its largest component, or one
+    !> nearly as large, is formed as a sum that does not cancel: no digits are lost at any attitude.
     pure function quat_along(matrix) result(q)
         real(wp), intent(in) :: matrix(3, 3)
         real(wp) :: q(4)

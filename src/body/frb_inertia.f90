@@ -1,9 +1,9 @@
 !> The constants of a body that every routine of the flow needs, formed once, from three principal moments in
 !> any order or from a full inertia tensor.
 !>
-!> Linear rotors (two equal moments, the third 0; a linear molecule): the momentum along the axis of the zero
-!> moment is 0, and then m' = m x I^-1 m = 0 and the angular velocity is m/I, both as for a sphere of moment
-!> I. So the constants are those of that sphere, and the momentum along the axis is checked.
+!> Linear rotors have two equal moments I and a third moment 0, as a linear molecule. Their momentum along the
+!> axis of the zero moment is 0. Then m' = m x I^-1 m = 0 and the angular velocity is m/I, as for a sphere of
+!> moment I: a linear rotor has the constants of this sphere, and the momentum along the axis is checked.
 module frb_inertia
     use frb_kinds, only: wp
     use frb_lapack, only: dsyev
@@ -26,7 +26,7 @@ module frb_inertia
     !> What `type(rigid_body)` holds. A core that could not be made has `status /= status_ok`, and every
     !> routine that takes a body refuses it with that code. Interoperable, so that C can hold arrays of them.
     type, bind(c) :: body_core
-        ! What blocks of bodies read comes first, in one line of the cache.
+        ! The components that blocks of bodies read come first, in one line of the cache.
         real(c_double) :: lane = 0.0_wp               !! 1 to 3: first axis of the cyclic order; 4: the axes
                                                       !! turn; < 0: moments descend; 0: not in a block
         real(c_double) :: a(3) = 0.0_wp               !! 1/I, sorted: a(1) >= a(2) >= a(3)
@@ -44,11 +44,12 @@ module frb_inertia
         real(c_double) :: axis(3) = 0.0_wp            !! of the zero moment of a linear rotor, in body axes
     end type body_core
 
-    !> Moments that differ by less than this part of the largest are equal, smaller ones are 0: the rounding
-    !> of R diag(I) R^T and of its eigenvalues.
+    !> Moments that differ by less than this part of the largest moment are equal, and smaller moments are 0:
+    !> the rounding error of R diag(I) R^T and of its eigenvalues.
     real(wp), parameter :: rank_tolerance = 16*epsilon(1.0_wp)
-    !> Largest part of the momentum of a linear rotor that may lie along its axis: rounding, also where a kick
-    !> has cancelled most of the momentum.
+
+    !> Largest part of the momentum of a linear rotor that may lie along its axis. It allows for rounding,
+    !> also after a kick that has cancelled most of the momentum.
     real(wp), parameter :: axis_tolerance = 1.0e-8_wp
 
 contains
@@ -110,8 +111,8 @@ contains
         if (core%needs_rotation .and. .not. core%linear) core%lane = 4*core%parity
     end function core_from_tensor
 
-    !> Takes what a linear rotor's momentum has along the axis out of m, where it is more than rounding.
-    !> `code` is `status_bad_momentum`, and m as it was, if that is more than 1e-8 of the momentum.
+    !> Removes from m the component along the axis of a linear rotor, if it is more than rounding. If it is
+    !> more than 1e-8 of the momentum, `code` is `status_bad_momentum` and m stays as it is.
     pure subroutine keep_off_axis(core, m, code)
         type(body_core), intent(in) :: core
         real(wp), intent(inout) :: m(3)         !! angular momentum, body axes; finite
@@ -120,7 +121,7 @@ contains
 
         code = status_ok
         if (.not. core%linear) return
-        ! A quarter of each, as the sum of three components may overflow.
+        ! A quarter of each component: the sum of three may overflow.
         largest = maxval(0.25_wp*abs(m))
         along = sum(core%axis*(0.25_wp*m))
         if (abs(along) > axis_tolerance*largest) then
@@ -131,13 +132,14 @@ contains
     end subroutine keep_off_axis
 
     !> Principal moments and axes of an inertia tensor: tensor = axes diag(moments) axes^T, by LAPACK's dsyev.
-    !> `axes` is a rotation (determinant +1): its columns are the principal axes in the axes of the tensor,
-    !> it takes principal components to those of the tensor's axes. `moments` ascend, except that a diagonal
-    !> tensor comes back as it is, in its own order with `axes` the identity. Moments and axes are those of a
-    !> tensor within a few roundings of the largest moment of the given one. A moment below 16 epsilon of the
-    !> largest is rounding: it comes back as 0, the other two as their mean, if they are equal to 16 epsilon.
+    !> `axes` is a rotation (determinant +1). Its columns are the principal axes in the axes of the tensor: it
+    !> takes components in principal axes to components in the axes of the tensor. `moments` ascend, except
+    !> for a diagonal tensor, whose moments keep their order and whose `axes` are the identity. Moments and
+    !> axes are those of a tensor that differs from the given one by a few roundings of the largest moment. A
+    !> moment below 16 epsilon of the largest is rounding: it comes back as 0, and the other two, which must
+    !> be equal to 16 epsilon, as their mean.
     !>
-    !> `frb_step` and `quat_step` then take m and Q in principal axes, and give them back so:
+    !> `frb_step` and `quat_step` take m and Q in principal axes, and return them in principal axes:
     !>
     !>     m = matmul(m, axes);   Q = matmul(Q, axes)                  ! to principal axes
     !>     m = matmul(axes, m);   Q = matmul(Q, transpose(axes))       ! and back
@@ -187,8 +189,8 @@ contains
         call conclude(code, 'principal_axes', stat)
     end subroutine principal_axes
 
-    !> Moments of which one is rounding beside the largest become those of a linear rotor, or are refused;
-    !> the rank of a tensor does not depend on its axes.
+    !> Where the smallest moment is only rounding beside the largest, the moments become those of a linear
+    !> rotor, or are refused. So the rank of a tensor does not depend on its axes.
     pure subroutine settle_rank(moments, code)
         real(wp), intent(inout) :: moments(3)
         integer, intent(inout) :: code

@@ -1,31 +1,29 @@
-!> Algorithm 1: the free rigid body with the attitude as a rotation matrix.
+!> Algorithm 1, kept for the users of the paper's package; new code: `free_flow`.
+!>
+!> The free rigid body with the attitude as a rotation matrix.
 module frb_matrix_step
-    use frb_kinds, only: wp, most_points
+    use frb_kinds, only: wp
     use frb_paper_angle, only: exact_angle, quadrature_angle, angle_by_middle_axis
     use frb_paper_momentum, only: momentum_step, momentum_by_addition, momentum_by_phase
-    use frb_paper_motion, only: paper_motion, normal_form, simple_motion, add_momentum, motion_elliptic
+    use frb_paper_motion, only: paper_motion, normal_form, attitude_code, simple_motion, add_momentum, &
+        motion_elliptic
     use frb_rotations, only: cross, norm3, quat_rotate, quat_along
-    use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_count
-    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+    use frb_status, only: conclude, status_ok
     implicit none
     private
 
-    public :: frb_step, largest_attitude
-
-
-    !> No element of an attitude may be larger: a turn of it could overflow.
-    real(wp), parameter :: largest_attitude = 1.0e300_wp
+    public :: frb_step
 
 contains
 
     !> One step of the free rigid body, m' = m x (m/I), Q' = Q hat(m/I): Algorithm 1 of the paper, with the
     !> frame from m and m' (section 1.3) and the angle (9).
     !>
-    !> Any norm of the momentum, any order of the moments, h of any sign and size: rescaling and reordering
+    !> The momentum may have any norm, the moments any order, h any sign and size: rescaling and reordering
     !> (section 3.1) happen inside. Qin need not be orthogonal to rounding: Qout is Qin times a rotation,
     !> formed as Qin plus a change.
-    !> Output may be the same variable as input. On the separatrix, about an axis, for two or three equal
-    !> moments and for no momentum the formulas of those motions are used.
+    !> Output may be the same variable as input. Motions on the separatrix, about an axis, with two or three
+    !> equal moments and without momentum have formulas of their own.
     !>
     !> np absent or 0: exact. np >= 1: semi-exact, the integral of the third kind by np Gauss-Legendre points
     !> (order 2 np in h, time-symmetric; |m|, the energy and Q m are kept all the same); for a small h only,
@@ -44,8 +42,8 @@ contains
     !> status_bad_attitude (not finite, or beyond 1e300), status_bad_count (np < 0 or np > 1000),
     !> status_lapack_failed (no nodes for np > 10). The output is then the input.
     subroutine frb_step(Piout, Qout, h, aInert, Piin, Qin, np, stat)
-        ! inout and target, because output and input may be one variable: neither may a compiler assume that
-        ! they are not, nor may the input be undefined on entry. Input is read before output is written.
+        ! Output and input may be one variable. `target` says so to the compiler, `inout` keeps the value that
+        ! stands there on entry, and all input is read before output is written.
         real(wp), intent(inout), target :: Piout(3)    !! body angular momentum at h
         real(wp), intent(inout), target :: Qout(3, 3)  !! attitude at h, body to space
         real(wp), intent(in) :: h                      !! step, any finite number
@@ -63,22 +61,8 @@ contains
         points = 0
         if (present(np)) points = np
         call normal_form(h, aInert, start_m, motion, code)
-        if (code == status_ok) then
-            if (.not. all(ieee_is_finite(start_q))) then
-                code = status_bad_attitude
-            else if (maxval(abs(start_q)) > largest_attitude) then
-                code = status_bad_attitude
-            else if (points < 0 .or. points > most_points) then
-                code = status_bad_count
-            end if
-        end if
-        if (code == status_ok) then
-            if (motion%kind == motion_elliptic) then
-                call elliptic_turn(motion, points, change, turn, code)
-            else
-                call simple_motion(motion, change, turn)
-            end if
-        end if
+        if (code == status_ok) code = attitude_code(9, start_q, .true., points)
+        if (code == status_ok) call change_and_turn(motion, points, change, turn, code)
         if (code == status_ok) then
             Piout = add_momentum(motion, start_m, change)
             Qout = turned_attitude(motion, start_q, turn)
@@ -89,9 +73,9 @@ contains
         call conclude(code, 'frb_step', stat)
     end subroutine frb_step
 
-    !> Qin E(q/|q|) as Qin + Qin (E(q/|q|) - 1), with E - 1 = 2 (q0 hat(q) + hat(q)**2)/|q|**2, (10), which is
-    !> a rotation whatever the norm of q. The change of a small step is small, and so is what rounding adds to
-    !> the lengths of the columns and to the angles between them: in a chain of steps it does not pile up.
+    !> Qin E(q/|q|) as Qin + Qin (E(q/|q|) - 1), with E - 1 = 2 (q0 hat(q) + hat(q)**2)/|q|**2, (10): E is a
+    !> rotation for any norm of q. A small step has a small change with small rounding errors, so in a chain
+    !> of steps the lengths of the columns and the angles between them are kept.
     pure function turned_attitude(motion, q_in, turn) result(q_out)
         type(paper_motion), intent(in) :: motion
         real(wp), intent(in) :: q_in(3, 3)
@@ -105,7 +89,7 @@ contains
         else
             v(motion%order) = motion%parity*turn(2:4)
         end if
-        ! The factor comes last: from a matrix factor*q0 is 1/2, next to which rounding errs to one side.
+        ! The factor comes last: factor*q0 may be next to 1/2, and its rounding errors would have one sign.
         factor = 2/(q0*q0 + v(1)*v(1) + v(2)*v(2) + v(3)*v(3))
         associate (a1 => q_in(:, 1), a2 => q_in(:, 2), a3 => q_in(:, 3))
             q_out(:, 1) = a1 + factor*(a2*(v(1)*v(2) + q0*v(3)) + a3*(v(1)*v(3) - q0*v(2)) &
@@ -117,9 +101,10 @@ contains
         end associate
     end function turned_attitude
 
-    !> Lines (5) to (18) of Algorithm 1: the rotation P(0)^T Y(psi) P(h), P = [v, w, m]^T with v along m',
-    !> (6), in sorted axes; as a quaternion, because rounding leaves the nine numbers a little off a rotation.
-    subroutine elliptic_turn(motion, points, change, turn, code)
+    !> The change of the momentum and the turn of the body. Lines (5) to (18) of Algorithm 1: the rotation
+    !> P(0)^T Y(psi) P(h), P = [v, w, m]^T with v along m', (6), in sorted axes. It comes back as a
+    !> quaternion: the nine numbers are a rotation up to rounding only, and every quaternion is one.
+    subroutine change_and_turn(motion, points, change, turn, code)
         type(paper_motion), intent(in) :: motion
         integer, intent(in) :: points
         real(wp), intent(out) :: change(3)
@@ -130,6 +115,10 @@ contains
         integer :: j
 
         code = status_ok
+        if (motion%kind /= motion_elliptic) then
+            call simple_motion(motion, change, turn)
+            return
+        end if
         v0 = direction_of_derivative(motion, motion%m)
         w0 = cross(motion%m, v0)
         if (points > 0 .and. motion%kc2 > 0.0_wp) then
@@ -148,9 +137,9 @@ contains
             rotation(:, j) = v0*(cosine*v(j) - sine*w(j)) + w0*(sine*v(j) + cosine*w(j)) + motion%m*step%m(j)
         end do
         turn = quat_along(rotation)
-    end subroutine elliptic_turn
+    end subroutine change_and_turn
 
-    !> Unit vector along m'. Rounding can put m(h) on an axis exactly; then any vector across m serves.
+    !> Unit vector along m'. If rounding has put m(h) on an axis, m' is zero, and any vector across m will do.
     pure function direction_of_derivative(motion, m) result(v)
         type(paper_motion), intent(in) :: motion
         real(wp), intent(in) :: m(3)
@@ -168,7 +157,7 @@ contains
         v = v/length
     end function direction_of_derivative
 
-    !> Cosine and sine of psi, exactly: P(0) z P(h)^T is a rotation about e3, and `angle` adds to it.
+    !> Cosine and sine of psi, exactly. P(0) z P(h)^T is a rotation about e3; psi is its angle plus `angle`.
     pure subroutine exact_turn(motion, step, v0, w0, v, cosine, sine)
         type(paper_motion), intent(in) :: motion
         type(momentum_step), intent(in) :: step
@@ -181,7 +170,7 @@ contains
         x = v0(1)*turned(1) + v0(2)*turned(2) + v0(3)*turned(3)
         y = w0(1)*turned(1) + w0(2)*turned(2) + w0(3)*turned(3)
         length2 = x*x + y*y
-        if (abs(1 - length2) > 1.0e-8_wp) then    ! a long stay at the middle axis has cost most digits
+        if (abs(1 - length2) > 1.0e-8_wp) then    ! after a long stay near the middle axis
             if (length2 < 1.0e-280_wp) then
                 x = 1.0_wp
                 y = 0.0_wp
@@ -190,7 +179,7 @@ contains
             x = x/sqrt(length2)
             y = y/sqrt(length2)
         else
-            ! 1/sqrt by its tangent, next to one
+            ! 1/sqrt(length2) by the first two terms of its series about 1.
             x = x + (0.5_wp*(1 - length2))*x
             y = y + (0.5_wp*(1 - length2))*y
         end if

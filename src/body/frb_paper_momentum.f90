@@ -1,14 +1,13 @@
 !> Update of the momentum, section 3.2, in two ways.
 !>
-!> `momentum_by_addition`, for exact steps, follows the last paragraph of that section: by the addition
-!> formulae of sn, cn, dn the phase nu enters through its sn, cn, dn only, and these are the components of
-!> m(0). So no elliptic integral of the first kind is inverted, no quadrant decided, and one Landen
-!> transformation at lambda h/2 is left. Written in m itself the formulae hold in all three cases, and the
-!> step is "old value plus change": for small h nothing is lost, and over many steps rounding errors add up
-!> like those of the changes.
+!> `momentum_by_addition`, for exact steps, follows the last paragraph of that section. The addition formulae
+!> of sn, cn, dn need only sn, cn, dn of the phase nu, and these are the components of m(0). So no elliptic
+!> integral of the first kind is inverted, no quadrant is decided, and one Landen transformation at lambda h/2
+!> is enough. Written in m itself the formulae hold in all three cases. The step is old value plus change: its
+!> rounding errors are those of the change, small for small h.
 !>
-!> `momentum_by_phase`, for steps with quadrature, goes through the phase: one AGM sequence, one Landen
-!> transformation up and one down, because the quadrature (20) needs both amplitudes.
+!> `momentum_by_phase`, for steps with quadrature, finds the phase: the quadrature (20) needs the amplitudes
+!> at both ends. It takes one AGM sequence, one Landen transformation up and one down.
 module frb_paper_momentum
     use frb_agm, only: jacobi, landen_step, ellip_k
     use frb_kinds, only: wp, half_pi
@@ -18,14 +17,14 @@ module frb_paper_momentum
 
     public :: momentum_step, momentum_by_addition, momentum_by_phase
 
-    !> Half a step, in units of 1/lambda, from which m(h) is not formed from m(h/2) any more: m may have come
-    !> so close to the middle axis there that rounding errors grow.
+    !> From this half step on, in units of 1/lambda, m(h) is formed from m(0), not from m(h/2): m(h/2) may be
+    !> so close to the middle axis that its rounding errors grow.
     real(wp), parameter :: long_half_step = 3.0_wp
 
-    !> Half a step on the separatrix, in units of 1/lambda, beyond which m has come to rest to 1e-260.
+    !> On the separatrix m is at rest, to 1e-260, beyond this half step, in units of 1/lambda.
     real(wp), parameter :: long_on_separatrix = 300.0_wp
 
-    !> A step of the momentum and what the attitude needs of it, all for sorted axes and norm one.
+    !> A step of the unit momentum in sorted axes, and the numbers that the attitude needs.
     type :: momentum_step
         real(wp) :: change(3)       !! m(h) - m(0)
         real(wp) :: m(3)            !! m(h)
@@ -61,7 +60,7 @@ contains
                 step%half_turns = anint(0.5_wp*u/ellip_k(0.0_wp, motion%kc2))
             end if
             s = step%sn/motion%lambda
-            ! D = 1 - alpha gamma m2**2 s**2 as a sum of squares that keeps its digits near the separatrix
+            ! D = 1 - alpha gamma m2**2 s**2 as a sum of squares, which keeps its digits near the separatrix.
             if (motion%first_case) then
                 c = step%cn
                 d = step%dn
@@ -126,14 +125,14 @@ contains
         end associate
     end subroutine add_long_step
 
-    !> m(h) and the amplitudes by the phase, (4) and (5); what belongs to h/2 is not set.
+    !> m(h) and the amplitudes by the phase, (4) and (5); the components for h/2 are not set.
     pure subroutine momentum_by_phase(motion, step)
         type(paper_motion), intent(in) :: motion    !! an elliptic motion off the separatrix
         type(momentum_step), intent(out) :: step
 
         associate (m => motion%m, p => motion%p, r => motion%r, alpha => motion%alpha, beta => motion%beta, &
                    gamma => motion%gamma)
-            ! (sn, cn) at the start are wanted up to a common factor only
+            ! `landen_step` takes sn and cn at the start up to a common factor.
             if (motion%first_case) then
                 call landen_step(m(2)*sqrt(gamma), m(3)*sqrt(beta), sign(motion%lambda, m(1))*motion%time, &
                                  0.0_wp, step%sn, step%cn, step%dn, step%phi0, step%phi1, motion%kc2)

@@ -6,7 +6,7 @@
 !>
 !>     m1' = -alpha m2 m3,      m2' = beta m3 m1,      m3' = -gamma m1 m2,      beta = alpha + gamma.
 !>
-!> The paper's constants, in forms that are sums of terms of one sign wherever that is possible:
+!> The paper's constants, as sums of terms of one sign where such a form exists:
 !>
 !>     p = 2T - 1/I3 = beta m1**2 + alpha m2**2        r = 1/I1 - 2T = gamma m2**2 + beta m3**2
 !>     delta = 1/I2 - 2T = alpha m3**2 - gamma m1**2   lambda3**2 = gamma p,  lambda1**2 = alpha r,
@@ -15,14 +15,15 @@
 !> 1 - k**2 = beta abs(delta)/lambda**2.
 module frb_paper_motion
     use frb_inertia, only: sorting_order
-    use frb_kinds, only: wp
+    use frb_kinds, only: wp, most_points
     use frb_rotations, only: quat_product
-    use frb_status, only: status_ok, status_bad_moments, status_bad_momentum, status_bad_time
+    use frb_status, only: status_ok, status_bad_attitude, status_bad_count, status_bad_moments, &
+        status_bad_momentum, status_bad_time
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
     implicit none
     private
 
-    public :: paper_motion, normal_form, simple_motion, add_momentum, turn_from_one
+    public :: paper_motion, normal_form, attitude_code, simple_motion, add_momentum, turn_from_one
     public :: motion_at_rest, motion_sphere, motion_axis, motion_equal_12, motion_equal_23, motion_elliptic
 
     integer, parameter :: motion_at_rest = 0    !! m = 0
@@ -32,14 +33,18 @@ module frb_paper_motion
     integer, parameter :: motion_equal_23 = 4   !! I2 = I3: m turns about axis 1
     integer, parameter :: motion_elliptic = 5   !! the three cases of section 1.2
 
-    !> A momentum that is closer than this to a principal axis counts as on it, so that no square underflows.
+    !> No element of an attitude may be larger: a turn of the attitude could overflow.
+    real(wp), parameter :: largest_attitude = 1.0e300_wp
+
+    !> A unit momentum closer than this to a principal axis counts as on the axis, so that no square
+    !> underflows.
     real(wp), parameter :: on_axis = 1.0e-130_wp
 
-    !> 1 - k**2 below this counts as the separatrix, for the same reason.
+    !> A motion with 1 - k**2 below this counts as on the separatrix, so that nothing underflows.
     real(wp), parameter :: on_separatrix = 1.0e-270_wp
 
-    !> alpha below this counts as I2 = I3, so that nothing underflows. Both are then far larger than I1: by
-    !> 1e90, or where they agree to their last digit, I3 - I2 > 1.1e-16 I3 yet, by 1e74.
+    !> A body with alpha below this counts as one with I2 = I3, so that nothing underflows. Such I2 and I3 are
+    !> far larger than I1: by a factor of 1e90, or of 1e74 if they differ in their last digit only.
     real(wp), parameter :: smallest_alpha = 1.0e-90_wp
 
     !> One step in the paper's form; made by `normal_form`.
@@ -103,7 +108,7 @@ contains
         end if
         motion%norm = sqrt(scaled(1)*scaled(1) + scaled(2)*scaled(2) + scaled(3)*scaled(3))
         scaled = scaled/motion%norm
-        ! the rounding of the norm is the same in every step of a chain, and would add up
+        ! The norm's rounding error is the same in every step of a chain: it would add up.
         excess = scaled(1)*scaled(1) + scaled(2)*scaled(2) + scaled(3)*scaled(3) - 1
         motion%m = scaled - (0.5_wp*excess)*scaled
         motion%time = scaled_time(h, motion%norm, j1, motion%shift)
@@ -127,6 +132,23 @@ contains
             call set_constants(motion)
         end if
     end subroutine normal_form
+
+    !> `status_ok`, or what is wrong with the attitude or the number of Gauss points of a step.
+    pure function attitude_code(elements, attitude, zero_allowed, points) result(code)
+        integer, intent(in) :: elements             !! 9 for a matrix, 4 for a quaternion
+        real(wp), intent(in) :: attitude(elements)
+        logical, intent(in) :: zero_allowed
+        integer, intent(in) :: points
+        integer :: code
+        real(wp) :: largest
+
+        code = status_bad_attitude
+        if (.not. all(ieee_is_finite(attitude))) return
+        largest = maxval(abs(attitude))
+        if (largest > largest_attitude .or. (largest <= 0.0_wp .and. .not. zero_allowed)) return
+        code = status_bad_count
+        if (points >= 0 .and. points <= most_points) code = status_ok
+    end function attitude_code
 
     !> Constants of the elliptic motion, (3).
     pure subroutine set_constants(motion)
@@ -171,7 +193,7 @@ contains
         case (motion_sphere)
             q = turn_about(motion%m, motion%time)
         case (motion_equal_12)
-            ! m turns about axis 3 by beta m3 t; what is left is a turn about m by t/I1
+            ! m turns about axis 3 by beta m3 t; the other factor is a turn about m by t/I1.
             sine = sin(0.5_wp*(motion%beta*motion%m(3)*motion%time))
             cosine = cos(0.5_wp*(motion%beta*motion%m(3)*motion%time))
             change(1) = -2*sine*(motion%m(1)*sine + motion%m(2)*cosine)
@@ -186,14 +208,14 @@ contains
             spin = [cosine, sine, 0.0_wp, 0.0_wp]
             q = quat_product(turn_about(motion%m, motion%a3*motion%time), spin)
         case default
-            ! m and the angular velocity are parallel: the angle is 2T t
+            ! m and the angular velocity are parallel: the angle is 2T t.
             q = turn_about(motion%m, (motion%m(1)**2 + motion%a2*motion%m(2)**2 &
                                       + motion%a3*motion%m(3)**2)*motion%time)
         end select
     end subroutine simple_motion
 
-    !> The caller's momentum after a change of the sorted one of norm one. Old value plus change: for a small
-    !> step the rounding error is that of a small number.
+    !> The caller's momentum at the end, from a change of the sorted unit momentum. It is formed as old value
+    !> plus change: the rounding error of a small step is that of a small number.
     pure function add_momentum(motion, momentum, change) result(new)
         type(paper_motion), intent(in) :: motion
         real(wp), intent(in) :: momentum(3)     !! at the start, in the caller's order
@@ -204,7 +226,7 @@ contains
 
         difference = motion%norm*change
         if (motion%shift /= 0) then
-            ! halves, so that nothing overflows on the way to a result that is close to the largest number
+            ! Halves: the result may be close to the largest number, and their sum does not overflow.
             do i = 1, 3
                 new(motion%order(i)) = scale(0.5_wp*momentum(motion%order(i)), -motion%shift) &
                     + 0.5_wp*motion%parity*difference(i)
@@ -220,10 +242,10 @@ contains
         end if
     end function add_momentum
 
-    !> The turn of a body as a change of its attitude, in the caller's axes: `turn` is sense (1 + change). The
-    !> scalar part is formed from the vector part v, q0 - 1 = -|v|**2/(1 + q0), so that the norm of 1 + change
-    !> is one to the rounding of change, and an attitude advanced as old value plus change keeps its norm. A
-    !> turn that is short or long by a part of a rounding, in each step of a chain, would let it grow.
+    !> The turn of a body as a change of its attitude, in the caller's axes: turn = sense (1 + change). The
+    !> scalar part of the change comes from the vector part v, q0 - 1 = -|v|**2/(1 + q0): the norm of
+    !> 1 + change is then one to the rounding error of the change, and an attitude advanced as old value plus
+    !> change keeps its norm in a long chain of steps.
     pure subroutine turn_from_one(motion, turn, change, sense)
         type(paper_motion), intent(in) :: motion
         real(wp), intent(in) :: turn(4)         !! a quaternion of norm one to rounding, sorted axes
@@ -257,7 +279,7 @@ contains
         yes = max(min(abs(m(1)), abs(m(2))), min(abs(m(1)), abs(m(3))), min(abs(m(2)), abs(m(3)))) < on_axis
     end function is_on_axis
 
-    !> h norm 2**shift/j1 without overflow on the way, and not above 2**1000, where the phase means nothing.
+    !> h norm 2**shift/j1 without overflow on the way, and at most 2**1000: such a phase has no correct digit.
     pure function scaled_time(h, norm, j1, shift) result(time)
         real(wp), intent(in) :: h, norm, j1
         integer, intent(in) :: shift

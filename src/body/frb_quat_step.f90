@@ -1,14 +1,14 @@
-!> Algorithm 2: the free rigid body with the attitude as a quaternion, in the three frames of section 1.4.
+!> Algorithm 2, kept for the users of the paper's package; new code: `free_flow`.
+!>
+!> The free rigid body with the attitude as a quaternion, in the three frames of section 1.4.
 module frb_quat_step
-    use frb_kinds, only: wp, most_points
-    use frb_matrix_step, only: largest_attitude
+    use frb_kinds, only: wp
     use frb_paper_angle, only: exact_angle, quadrature_angle, angle_by_middle_axis, angle_by_outer_axes
     use frb_paper_momentum, only: momentum_step, momentum_by_addition, momentum_by_phase
-    use frb_paper_motion, only: paper_motion, normal_form, simple_motion, add_momentum, turn_from_one, &
-        motion_elliptic
+    use frb_paper_motion, only: paper_motion, normal_form, attitude_code, simple_motion, add_momentum, &
+        turn_from_one, motion_elliptic
     use frb_rotations, only: quat_product, quat_conjugate
-    use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_count, status_bad_option
-    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+    use frb_status, only: conclude, status_ok, status_bad_option
     implicit none
     private
 
@@ -23,10 +23,10 @@ contains
     !> One step of the free rigid body, m' = m x (m/I), q' = q (0, m/I)/2: Algorithm 2 of the paper, with the
     !> frame (1), (2) or (3) of section 1.4.
     !>
-    !> Any norm of the momentum, any order of the moments, h of any sign and size: rescaling and reordering
+    !> The momentum may have any norm, the moments any order, h any sign and size: rescaling and reordering
     !> (section 3.1) happen inside. qin may have any nonzero norm: qout is qin times a unit quaternion.
-    !> Output may be the same variable as input. On the separatrix, about an axis, for two or three equal
-    !> moments and for no momentum the formulas of those motions are used.
+    !> Output may be the same variable as input. Motions on the separatrix, about an axis, with two or three
+    !> equal moments and without momentum have formulas of their own.
     !>
     !> np absent or 0: exact, and qout depends continuously on h. np >= 1: semi-exact, the integral of the
     !> third kind by np Gauss-Legendre points (order 2 np in h, time-symmetric; |m|, the energy and the
@@ -47,8 +47,8 @@ contains
     !> status_bad_option (another frame), status_lapack_failed (no nodes for np > 10). The output is then the
     !> input.
     subroutine quat_step(Piout, qout, h, aInert, Piin, qin, np, frame, stat)
-        ! inout and target, because output and input may be one variable: neither may a compiler assume that
-        ! they are not, nor may the input be undefined on entry. Input is read before output is written.
+        ! Output and input may be one variable. `target` says so to the compiler, `inout` keeps the value that
+        ! stands there on entry, and all input is read before output is written.
         real(wp), intent(inout), target :: Piout(3)    !! body angular momentum at h
         real(wp), intent(inout), target :: qout(4)     !! attitude at h, scalar first, body to space
         real(wp), intent(in) :: h                      !! step, any finite number
@@ -69,24 +69,11 @@ contains
         chosen = frame_shortest
         if (present(frame)) chosen = frame
         call normal_form(h, aInert, start_m, motion, code)
-        if (code == status_ok) then
-            if (.not. all(ieee_is_finite(start_q))) then
-                code = status_bad_attitude
-            else if (maxval(abs(start_q)) <= 0.0_wp .or. maxval(abs(start_q)) > largest_attitude) then
-                code = status_bad_attitude
-            else if (points < 0 .or. points > most_points) then
-                code = status_bad_count
-            else if (chosen < frame_shortest .or. chosen > frame_axis) then
-                code = status_bad_option
-            end if
+        if (code == status_ok) code = attitude_code(4, start_q, .false., points)
+        if (code == status_ok .and. (chosen < frame_shortest .or. chosen > frame_axis)) then
+            code = status_bad_option
         end if
-        if (code == status_ok) then
-            if (motion%kind == motion_elliptic) then
-                call elliptic_turn(motion, points, chosen, change, turn, code)
-            else
-                call simple_motion(motion, change, turn)
-            end if
-        end if
+        if (code == status_ok) call change_and_turn(motion, points, chosen, change, turn, code)
         if (code == status_ok) then
             Piout = add_momentum(motion, start_m, change)
             call turn_from_one(motion, turn, turn_change, sense)
@@ -98,8 +85,9 @@ contains
         call conclude(code, 'quat_step', stat)
     end subroutine quat_step
 
-    !> Lines (5) to (21) of Algorithm 2: p(0)^-1 y(psi) p(h), (12), in sorted axes.
-    subroutine elliptic_turn(motion, points, frame, change, turn, code)
+    !> The change of the momentum and the turn of the body. Lines (5) to (21) of Algorithm 2: p(0)^-1 y(psi)
+    !> p(h), (12), in sorted axes.
+    subroutine change_and_turn(motion, points, frame, change, turn, code)
         type(paper_motion), intent(in) :: motion
         integer, intent(in) :: points, frame
         real(wp), intent(out) :: change(3)
@@ -109,6 +97,10 @@ contains
         real(wp) :: p0(4), p(4), y(2)
 
         code = status_ok
+        if (motion%kind /= motion_elliptic) then
+            call simple_motion(motion, change, turn)
+            return
+        end if
         p0 = frame_quaternion(motion, motion%m, frame)
         if (points > 0 .and. motion%kc2 > 0.0_wp) then
             call momentum_by_phase(motion, step)
@@ -122,12 +114,12 @@ contains
         change = step%change
         turn = quat_product(quat_conjugate(p0), quat_product([y(1), 0.0_wp, 0.0_wp, y(2)], p))
         if (points > 0 .and. turn(1) < 0.0_wp) turn = -turn
-    end subroutine elliptic_turn
+    end subroutine change_and_turn
 
     !> The quaternion p of a frame: p m p^-1 = e3, (15), with
-    !> (p0, p3) = (cos(xi/2), sin(xi/2)) sqrt((1 + m3)/2): the frame is that of (1) turned about e3 by xi. The
-    !> printed formulas for p3**2 and the sign of p0 p3 are those of sin(xi/2)**2 = (1 - cos(xi))/2 and of
-    !> sin(xi); forming cos(xi) and sin(xi) keeps the digits.
+    !> (p0, p3) = (cos(xi/2), sin(xi/2)) sqrt((1 + m3)/2): it is frame (1), turned about e3 by an angle xi.
+    !> The paper prints p3**2, which has (1 - cos(xi))/2, and the sign of p0 p3, which is that of sin(xi).
+    !> Here cos(xi) and sin(xi) themselves are formed, and no digit is lost.
     pure function frame_quaternion(motion, m, frame) result(p)
         type(paper_motion), intent(in) :: motion
         real(wp), intent(in) :: m(3)
@@ -141,7 +133,7 @@ contains
             one_plus_m3 = 1 + m(3)
         end if
         if (one_plus_m3 < tiny(1.0_wp)) then
-            p = [0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp]    ! rounding has put m on the pole: half a turn about e1
+            p = [0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp]    ! m = -e3 to rounding: half a turn about e1
             return
         end if
         root = sqrt(0.5_wp*one_plus_m3)
@@ -185,7 +177,8 @@ contains
         end if
     end function half_angle
 
-    !> (cos(psi/2), sin(psi/2)), exactly: p(0) z p(h)^-1 is a rotation about e3, and `angle` adds to it.
+    !> (cos(psi/2), sin(psi/2)), exactly. p(0) z p(h)^-1 is a rotation about e3; psi is its angle plus
+    !> `angle`.
     pure subroutine exact_turn(motion, step, frame, p0, p, y)
         type(paper_motion), intent(in) :: motion
         type(momentum_step), intent(in) :: step
@@ -201,7 +194,7 @@ contains
         end if
         product = quat_product(quat_product(p0, z), quat_conjugate(p))
         scaling = product(1)*product(1) + product(4)*product(4)
-        if (scaling < 1.0e-280_wp) then    ! a long stay at the middle axis has cost all digits
+        if (scaling < 1.0e-280_wp) then    ! after a long stay near the middle axis
             product = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
             scaling = 1.0_wp
         end if
@@ -212,7 +205,8 @@ contains
         y(2) = product(4)*cosine + product(1)*sine
     end subroutine exact_turn
 
-    !> (cos(psi/2), sin(psi/2)) by quadrature. In frame (1), (16), f adds the angle of (m2, m1).
+    !> (cos(psi/2), sin(psi/2)) by quadrature. In frame (1) psi of (16) has a term f more: the change of the
+    !> angle of the vector (m2, m1).
     subroutine quadrature_turn(motion, step, points, frame, y, code)
         type(paper_motion), intent(in) :: motion
         type(momentum_step), intent(in) :: step
