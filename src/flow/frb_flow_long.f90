@@ -48,13 +48,15 @@ contains
         if (many_periods) call reduce_periods(pmax, delta, nu, with_attitude, fraction, turned, whole)
         ! Down to a part of the time that the series reach, by as many halvings as there are doublings.
         span = fraction*fraction
-        do triples = 0, most_halvings - 1
-            if (pmax*span <= square_limit) exit
+        triples = 0
+        do while (pmax*span > square_limit .and. triples < most_halvings)
             span = 0.25_wp*span
+            triples = triples + 1
         end do
-        do squares = 0, most_halvings - 1
-            if (pmax*span <= middle_limit) exit     ! nu <= pmax
+        squares = 0
+        do while (pmax*span > middle_limit .and. squares < most_halvings)   ! nu <= pmax
             span = 0.25_wp*span
+            squares = squares + 1
         end do
         call middle_series((p + r)*span, p*r*(span*span), y, s)
         y = y*span

@@ -12,7 +12,6 @@ module frb_flow_one
     use frb_kinds, only: wp
     use frb_status, only: status_ok, status_bad_momentum, status_bad_attitude, status_bad_time
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-    use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
@@ -53,7 +52,7 @@ contains
         real(wp) :: t, a, b, g, m1, m2, m3, gg, p, r, nu_first, nu_mirror, rate
         real(wp) :: y, scd, u, w, k, a23, b31, g12, d1, d2, d3
         real(wp) :: nu, v0, v1, v2, v3, angle, twist, cosm1, along, dot, square, change, w0, w1, w2, w3, q3
-        integer(int64) :: smallest, largest
+        real(wp) :: size_m, size_q
         integer :: i1, i2, i3, reach
         logical :: plain, first_form
 
@@ -66,23 +65,17 @@ contains
         t = 0.5_wp*h
         ! What is finite, not zero and far from overflow goes on; the rest is sorted out apart. No sum or
         ! product overflows on the way.
-        smallest = max(magnitude(m(1)), magnitude(m(2)), magnitude(m(3)))
-        largest = max(smallest, magnitude(t), magnitude(body%a(1)))
-        if (present(q)) then
-            largest = max(largest, magnitude(q(1)), magnitude(q(2)), magnitude(q(3)), magnitude(q(4)))
-            smallest = min(smallest, max(magnitude(q(1)), magnitude(q(2)), magnitude(q(3)), magnitude(q(4))))
-        end if
-        plain = are_plain(smallest, largest)
-        if (plain) then
-            rate = body%a(1)*t
-            plain = abs(rate) < plain_largest
-        end if
+        size_m = 0.25_wp*abs(m(1)) + (0.25_wp*abs(m(2)) + 0.25_wp*abs(m(3)))
+        size_q = size_m
+        if (present(q)) size_q = (abs(q(1)) + abs(q(2))) + (abs(q(3)) + abs(q(4)))
+        plain = are_plain(size_m, size_q, t, body%a(1))
         if (.not. plain) then
             code = status_bad_momentum
             if (.not. present(scaled)) call flow_rescaled(body, h, m, code, q)
             return
         end if
         code = status_ok
+        rate = body%a(1)*t
         square = rate*rate*(m1*m1 + m2*m2 + m3*m3)
         if (square > middle_turn_limit) then    ! long whatever the orbit: its constants are formed there
             if (square <= largest_square_angle .or. present(scaled)) then

@@ -12,7 +12,6 @@ module frb_flow_tangent_body
     use frb_kinds, only: wp
     use frb_status, only: status_ok, status_bad_momentum, status_bad_attitude, status_bad_time
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-    use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
@@ -35,22 +34,19 @@ contains
         real(wp), intent(inout), optional :: transition(6, 6)
         real(wp), intent(inout), optional :: jacobian(3, 3)
         real(wp), intent(inout), optional :: by_inertia(6, elements)
-        integer(int64) :: smallest, largest
-        real(wp) :: rate
+        real(wp) :: rate, size_m, size_q
         logical :: plain
 
         code = body%status
-        smallest = max(magnitude(m(1)), magnitude(m(2)), magnitude(m(3)))
-        largest = max(smallest, magnitude(h), magnitude(body%a(1)))
-        if (present(q)) then
-            largest = max(largest, magnitude(q(1)), magnitude(q(2)), magnitude(q(3)), magnitude(q(4)))
-            smallest = min(smallest, max(magnitude(q(1)), magnitude(q(2)), magnitude(q(3)), magnitude(q(4))))
-        end if
-        plain = are_plain(smallest, largest) .and. code == status_ok .and. .not. body%needs_rotation
+        size_m = 0.25_wp*abs(m(1)) + (0.25_wp*abs(m(2)) + 0.25_wp*abs(m(3)))
+        size_q = size_m
+        if (present(q)) size_q = (abs(q(1)) + abs(q(2))) + (abs(q(3)) + abs(q(4)))
+        plain = are_plain(size_m, size_q, h, body%a(1))
+        plain = plain .and. code == status_ok .and. .not. body%needs_rotation
+        if (plain) plain = abs(h) > 0.0_wp
         if (plain) then
             rate = body%a(1)*h
-            plain = abs(rate) < plain_largest .and. abs(h) > 0.0_wp
-            if (plain) plain = rate*rate*(m(1)*m(1) + m(2)*m(2) + m(3)*m(3)) <= largest_square_angle
+            plain = rate*rate*(m(1)*m(1) + m(2)*m(2) + m(3)*m(3)) <= largest_square_angle
         end if
         if (plain) then
             call tangent_plain(body, h, m, elements, q, transition, jacobian, by_inertia)

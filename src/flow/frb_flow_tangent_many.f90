@@ -7,7 +7,7 @@ module frb_flow_tangent_many
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
     use frb_status, only: status_ok
-    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_is_nan
     use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
@@ -167,19 +167,22 @@ contains
     pure function all_plain(block) result(plain)
         type(tangent_lanes), intent(in) :: block
         logical :: plain
-        integer(int64) :: largest, smallest, most_m, most_q
+        real(wp) :: size_m, size_q, least, most
+        integer(int64) :: many
         integer :: l
 
-        largest = 0_int64
-        smallest = huge(0_int64)
+        many = 0
         do l = 1, lanes
-            most_m = max(magnitude(block%m(l, 1)), magnitude(block%m(l, 2)), magnitude(block%m(l, 3)))
-            most_q = max(magnitude(block%q(l, 0)), magnitude(block%q(l, 1)), magnitude(block%q(l, 2)), &
-                         magnitude(block%q(l, 3)))
-            largest = max(largest, most_m, most_q)
-            smallest = min(smallest, most_m, most_q)
+            size_m = 0.25_wp*abs(block%m(l, 1)) + (0.25_wp*abs(block%m(l, 2)) + 0.25_wp*abs(block%m(l, 3)))
+            size_q = (0.25_wp*abs(block%q(l, 0)) + 0.25_wp*abs(block%q(l, 1))) &
+                     + (0.25_wp*abs(block%q(l, 2)) + 0.25_wp*abs(block%q(l, 3)))
+            size_m = merge(plain_largest, size_m, ieee_is_nan(size_m))      ! comparing a NaN raises a flag
+            size_q = merge(plain_largest, size_q, ieee_is_nan(size_q))
+            least = min(size_m, size_q)
+            most = max(size_m, size_q)
+            many = many + merge(1_int64, 0_int64, merge(least, 0.0_wp, most < plain_largest) > plain_smallest)
         end do
-        plain = are_plain(smallest, largest)
+        plain = many == lanes
     end function all_plain
 
     !> Whether angles that the body turns in the time h stay far from overflow.
@@ -192,7 +195,5 @@ contains
         if (plain) plain = abs(h) > 0.0_wp .and. abs(h) < plain_largest .and. body%a(1) < plain_largest
         if (plain) plain = abs(body%a(1)*h) < plain_largest
     end function is_plain_time
-
-    include 'plain_numbers.inc'
 
 end module frb_flow_tangent_many
