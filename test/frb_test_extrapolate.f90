@@ -1,6 +1,6 @@
 !> `extrapolate`: order, tolerances, times, observers, many bodies, refusals.
 module frb_test_extrapolate
-    use frb_checks, only: tally
+    use frb_checks, only: tally, worst_of
     use frb_extrapolation, only: extrapolate, extrapolation_report
     use frb_free_flow, only: free_flow, rigid_body
     use frb_kinds, only: wp
@@ -225,7 +225,7 @@ contains
             call extrapolate(bodies(i), item%top, 3.0_wp, m_one, q_one, 1.0e-9_wp, t=time, report=one)
             time = 1.0_wp
             steps = steps + int(one%steps)
-            apart = max(apart, distance(m(:, i), q(:, i), m_one, q_one))
+            apart = worst_of(apart, distance(m(:, i), q(:, i), m_one, q_one))
         end do
         call t%ok('many-bodies-move-each-as-by-itself', stat == status_ok .and. apart <= 0.0_wp)
         call t%equal('steps-of-many-bodies-add-up', int(report%steps), steps)

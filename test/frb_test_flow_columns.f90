@@ -4,7 +4,7 @@ module frb_test_flow_columns
     use, intrinsic :: iso_fortran_env, only: int64
     use frb, only: wp, rigid_body, free_flow, free_flow_columns, quat_to_matrix, status_ok, &
         status_bad_momentum, status_bad_attitude, status_bad_time, status_bad_count, status_bad_moments
-    use frb_checks, only: tally
+    use frb_checks, only: tally, largest, worst_of
     use frb_flow_samples, only: stream, no_rotation
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan, ieee_positive_inf
     implicit none
@@ -153,7 +153,7 @@ contains
                 apart = stat == status_ok .and. maxval(abs(mc - m)) <= eps
                 call t%ok('columns-of-momenta-alone: '//trim(names(kind)), apart)
             end if
-            call t%at_most('momenta-alone-to-a-unit: '//trim(names(kind)), maxval(abs(alone - m)), eps)
+            call t%at_most('momenta-alone-to-a-unit: '//trim(names(kind)), largest([abs(alone - m)]), eps)
         end do
     end subroutine check_columns
 
@@ -175,7 +175,7 @@ contains
                 one_q = some%q(:, i)
                 call free_flow(some%body(merge(5, i, k == 1)), some%h(i), one_m, one_q)
                 turned = 1 + abs(some%h(i))/minval(some%body(merge(5, i, k == 1))%moments())
-                worst = max(worst, norm2([one_m - m(:, i), one_q - q(:, i)])/turned)
+                worst = worst_of(worst, norm2([one_m - m(:, i), one_q - q(:, i)])/turned)
             end do
             call t%at_most('own-times-as-one-by-one: '//merge('by a tensor', 'all kinds  ', k == 1), worst, &
                            same_motion)
@@ -212,7 +212,7 @@ contains
                 call free_flow(some%body, some%h, mq, q)
             end select
             do i = 1, n
-                worst = max(worst, maxval(abs(a(:, :, i) - quat_to_matrix(q(:, i)))))
+                worst = worst_of(worst, [abs(a(:, :, i) - quat_to_matrix(q(:, i)))])
             end do
             if (stat /= status_ok .or. .not. same(m, mq)) worst = huge(worst)
         end do

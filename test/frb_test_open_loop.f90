@@ -1,6 +1,6 @@
 !> The open loop: loops of one's own against `integrate`, plans, times.
 module frb_test_open_loop
-    use frb_checks, only: tally, worst_of
+    use frb_checks, only: tally, worst_of, largest
     use frb_free_flow, only: free_flow, rigid_body
     use frb_invariants, only: kinetic_energy, spatial_momentum, total_energy
     use frb_kinds, only: wp
@@ -91,7 +91,7 @@ contains
                 call free_flow(body, plan%drift(i), ms_own, qs_own)
             end do
             call t%at_most(trim(scheme_names(k))//'-of-a-group-in-a-loop-of-ones-own-is-integrate', &
-                           max(maxval(abs(ms_own - ms)), maxval(abs(qs_own - qs))), 1.0e-14_wp)
+                           largest([abs(ms_own - ms), abs(qs_own - qs)]), 1.0e-14_wp)
         end do
     end subroutine test_own_loop
 

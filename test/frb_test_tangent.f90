@@ -1,7 +1,7 @@
 !> flow_tangent against reference cases, in units of the inherent sensitivity of each derivative: one body
 !> with and without its attitude, by its moments, bodies by a tensor.
 module frb_test_tangent
-    use frb_checks, only: tally
+    use frb_checks, only: tally, largest, worst_of
     use frb_flow_samples, only: no_turn, settled
     use frb_free_flow, only: flow_tangent, rigid_body
     use frb_kinds, only: wp
@@ -65,7 +65,7 @@ contains
             do k = 1, kinds
                 associate (name => trim(names(k))//': '//trim(cases(i)%group)//label)
                     if (medians) call t%at_most('median-of-'//name, median(pack(score(:, k), here)), bar)
-                    call t%at_most('score-of-'//name, maxval(score(:, k), mask=here), largest_score)
+                    call t%at_most('score-of-'//name, largest(pack(score(:, k), here)), largest_score)
                 end associate
             end do
         end do
@@ -102,18 +102,18 @@ contains
                 call flow_tangent(cases(i)%body, cases(i)%h, m, q, transition)
                 if (k == 1) one = transition(:, :, lane)
             end do
-            if (norm2(one) < 1.0e100_wp) moved = max(moved, maxval(abs(transition(:, :, lane) - one)))
+            if (norm2(one) < 1.0e100_wp) moved = worst_of(moved, [abs(transition(:, :, lane) - one)])
             score(i, 1) = score_matrix(transition(1:3, 1:3, lane), cases(i)%jacobian, cases(i)%sensitivity(1))
             score(i, 2) = score_matrix(transition(4:6, 1:3, lane), cases(i)%turns, cases(i)%sensitivity(2))
-            if (abs(cases(i)%h) <= 0.0_wp) score(i, 2) = maxval(abs(transition(4:6, 1:3, lane)))
+            if (abs(cases(i)%h) <= 0.0_wp) score(i, 2) = largest([abs(transition(4:6, 1:3, lane))])
             m_one = cases(i)%m0
             q_one = no_turn
             call flow_tangent(cases(i)%body, cases(i)%h, m_one, q_one, one)
-            apart = max(apart, norm2(transition(4:6, 4:6, lane) - one(4:6, 4:6)), norm2(q(:, lane) - q_one), &
-                        maxval(abs(transition(1:3, 4:6, lane))))
+            apart = worst_of(apart, [norm2(transition(4:6, 4:6, lane) - one(4:6, 4:6)), &
+                                     norm2(q(:, lane) - q_one), abs(transition(1:3, 4:6, lane))])
         end do
         call ieee_set_halting_mode(ieee_overflow, halting)
-        worst = maxval(score, dim=1)
+        worst = [largest(score(:, 1)), largest(score(:, 2))]
         call t%at_most('median-of-J-in-lanes'//label, median(score(:, 1)), largest_median)
         call t%at_most('median-of-W-in-lanes'//label, median(score(:, 2)), largest_median)
         call t%at_most('score-of-J-in-lanes'//label, worst(1), largest_score)
@@ -137,8 +137,9 @@ contains
             m_alone = m
             call flow_tangent(rigid_body(cases(i)%moments), cases(i)%h, m, q, phi)
             call flow_tangent(rigid_body(cases(i)%moments), cases(i)%h, m_alone, jacobian)
-            worst = max(worst, [score_momentum(cases(i), settled(m)), score_attitude(cases(i), settled(q)), &
-                                score_momentum(cases(i), settled(m_alone))])
+            worst = worst_of(worst, [score_momentum(cases(i), settled(m)), &
+                                     score_attitude(cases(i), settled(q)), &
+                                     score_momentum(cases(i), settled(m_alone))])
         end do
         call t%at_most('momentum-as-free-flow', worst(1), 2.0_wp)
         call t%at_most('attitude-as-free-flow', worst(2), 2.0_wp)

@@ -42,3 +42,10 @@ versions_agree() {
         [ "$(sed -n '/^#.*[Cc]hange log/,$p' README.md | grep -oE '[0-9]+\.[0-9]+\.[0-9]+' | head -n 1)" = "$version" ]
     fi
 }
+
+# In suites scores are collected by worst_of and largest of frb_checks: max and maxval may pass NaN over. Units and
+# status codes are no scores.
+no_suite_is_blind_to_nan() {
+    if grep -nP '(\b\w+(\([^()]*\))?) = max\(\1,|at_most\(.*\bmaxval\(' test/frb_test_*.f90 |
+        grep -vE ' (unit|code) = max'; then return 1; fi
+}
