@@ -132,10 +132,28 @@ contains
                 end if
             end do
         else
-            run%m(:, :) = run%m + amount*run%tau
-            if (abs(modified) > 0.0_wp) run%m(:, :) = run%m + modified*run%g
+            call add_to(size(run%m), amount, run%tau, run%m)
+            if (abs(modified) > 0.0_wp) call add_to(size(run%m), modified, run%g, run%m)
         end if
     end subroutine kick
+
+    !> x + amount change, in one loop whatever the shape.
+    pure subroutine add_to(count, amount, change, x)
+        integer, intent(in) :: count
+        real(wp), intent(in) :: amount, change(count)
+        real(wp), intent(inout) :: x(count)
+
+        x = x + amount*change
+    end subroutine add_to
+
+    !> A copy, in one loop whatever the shape.
+    pure subroutine copy(count, from, to)
+        integer, intent(in) :: count
+        real(wp), intent(in) :: from(count)
+        real(wp), intent(inout) :: to(count)
+
+        to = from
+    end subroutine copy
 
     !> The torques g of a modified kick, as for one body: all bodies turn at a time.
     subroutine ask_gradient(run, time, kick, modified, code)
@@ -237,22 +255,22 @@ contains
     subroutine keep(run)
         type(moving), intent(inout) :: run
 
-        run%kept_m(:, :) = run%m
-        run%kept_q(:, :) = run%q
+        call copy(size(run%m), run%m, run%kept_m)
+        call copy(size(run%q), run%q, run%kept_q)
         if (run%basis%compensated) then
-            run%kept_m_rest(:, :) = run%m_rest
-            run%kept_q_rest(:, :) = run%q_rest
+            call copy(size(run%m_rest), run%m_rest, run%kept_m_rest)
+            call copy(size(run%q_rest), run%q_rest, run%kept_q_rest)
         end if
     end subroutine keep
 
     subroutine go_back(run)
         type(moving), intent(inout) :: run
 
-        run%m(:, :) = run%kept_m
-        run%q(:, :) = run%kept_q
+        call copy(size(run%kept_m), run%kept_m, run%m)
+        call copy(size(run%kept_q), run%kept_q, run%q)
         if (run%basis%compensated) then
-            run%m_rest(:, :) = run%kept_m_rest
-            run%q_rest(:, :) = run%kept_q_rest
+            call copy(size(run%kept_m_rest), run%kept_m_rest, run%m_rest)
+            call copy(size(run%kept_q_rest), run%kept_q_rest, run%q_rest)
         end if
     end subroutine go_back
 
