@@ -11,7 +11,8 @@ module frb_flow_samples
     implicit none
     private
 
-    public :: stream, true_case, advanced, settled, same, near_separatrix, defect, no_turn, no_rotation
+    public :: stream, sample, random_samples, true_case, advanced, settled, same, near_separatrix, defect, &
+        diagonal, no_turn, no_rotation
 
     real(wp), parameter :: no_turn(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
     real(wp), parameter :: no_rotation(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, &
@@ -26,6 +27,11 @@ module frb_flow_samples
         procedure :: direction
         procedure :: triangle
     end type stream
+
+    !> A motion and a step, for the checks over many of them.
+    type :: sample
+        real(wp) :: moments(3), m(3), q(4), h
+    end type sample
 
 contains
 
@@ -71,6 +77,27 @@ contains
         moments(1) = self%uniform(1 - moments(2), moments(2))
         moments(3) = 1.0_wp
     end function triangle
+
+    !> Motions of bodies away from any special case, at most one orbit long or so: moments between 0.2 and 1,
+    !> |m| between 0.5 and 1.5, |h| < 4, every third one shorter.
+    function random_samples(number) result(samples)
+        integer, intent(in) :: number
+        type(sample) :: samples(number)
+        type(stream) :: random
+        integer :: i
+
+        do i = 1, size(samples)
+            associate (it => samples(i))
+                it%moments = [random%uniform(0.2_wp, 1.0_wp), random%uniform(0.2_wp, 1.0_wp), &
+                              random%uniform(0.2_wp, 1.0_wp)]
+                it%m = random%uniform(0.5_wp, 1.5_wp)*random%direction()
+                it%q = [random%uniform(-1.0_wp, 1.0_wp), random%direction()]
+                it%q = it%q/norm2(it%q)
+                it%h = random%uniform(-4.0_wp, 4.0_wp)
+                if (mod(i, 3) == 0) it%h = 0.1_wp*it%h
+            end associate
+        end do
+    end function random_samples
 
     !> A momentum of norm about one on the separatrix of ascending moments, to rounding, with m1 then grown by
     !> a relative `distance`.
@@ -163,5 +190,16 @@ contains
         worst(3) = abs(sum((scaled - scaled0)*(scaled + scaled0)*(minval(moments)/moments)))/energy0
         worst(4) = norm3(quat_rotate(state(4:7)/norm2(state(4:7)), scaled) - scaled0)
     end function defect
+
+    !> The diagonal matrix of three values.
+    pure function diagonal(values) result(matrix)
+        real(wp), intent(in) :: values(3)
+        real(wp) :: matrix(3, 3)
+
+        matrix = 0.0_wp
+        matrix(1, 1) = values(1)
+        matrix(2, 2) = values(2)
+        matrix(3, 3) = values(3)
+    end function diagonal
 
 end module frb_flow_samples

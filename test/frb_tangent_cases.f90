@@ -7,7 +7,7 @@ module frb_tangent_cases
     implicit none
     private
 
-    public :: tangent_case, read_tangent_cases, read_tensor_cases, score_matrix
+    public :: tangent_case, read_tangent_cases, read_tensor_cases, score_matrix, hat
 
     !> 22 digits are kept where the compiler can: scoring in double precision adds half a unit of its own.
     type :: tangent_case
@@ -98,5 +98,13 @@ contains
         if (norm2(x - exact) > 0.0_qp) score = real(min(norm2(x - exact)/max(unit, tiny(1.0_qp)), &
                                                         1.0e30_qp), wp)
     end function score_matrix
+
+    !> Matrix of the vector product with v.
+    pure function hat(v) result(x)
+        real(wp), intent(in) :: v(3)
+        real(wp) :: x(3, 3)
+
+        x = reshape([0.0_wp, v(3), -v(2), -v(3), 0.0_wp, v(1), v(2), -v(1), 0.0_wp], [3, 3])
+    end function hat
 
 end module frb_tangent_cases

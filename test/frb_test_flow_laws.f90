@@ -2,7 +2,7 @@
 !> steps of the paper.
 module frb_test_flow_laws
     use frb_checks, only: tally, largest, worst_of
-    use frb_flow_samples, only: stream, advanced, settled, defect, no_turn
+    use frb_flow_samples, only: sample, random_samples, advanced, settled, defect, diagonal, no_turn
     use frb_free_flow, only: free_flow, rigid_body
     use frb_kinds, only: wp
     use frb_matrix_step, only: frb_step
@@ -22,31 +22,14 @@ module frb_test_flow_laws
     !> Norms, energy, momentum in space after one step.
     real(wp), parameter :: on_the_orbit = 32*eps
 
-    !> A motion and a step, for the checks over many of them.
-    type :: sample
-        real(wp) :: moments(3), m(3), q(4), h
-    end type sample
-
 contains
 
     subroutine test_flow_laws(t)
         type(tally), intent(inout) :: t
-        type(sample) :: samples(300)
-        type(stream) :: random
-        integer :: i
+        type(sample), allocatable :: samples(:)
 
         call t%open_suite('flow-laws', 23)
-        do i = 1, size(samples)
-            associate (it => samples(i))
-                it%moments = [random%uniform(0.2_wp, 1.0_wp), random%uniform(0.2_wp, 1.0_wp), &
-                              random%uniform(0.2_wp, 1.0_wp)]
-                it%m = random%uniform(0.5_wp, 1.5_wp)*random%direction()
-                it%q = [random%uniform(-1.0_wp, 1.0_wp), random%direction()]
-                it%q = it%q/norm2(it%q)
-                it%h = random%uniform(-4.0_wp, 4.0_wp)
-                if (mod(i, 3) == 0) it%h = 0.1_wp*it%h
-            end associate
-        end do
+        samples = random_samples(300)
         call check_flow(t, samples)
         call check_relabelling(t, samples)
         call check_ways(t, samples)
@@ -267,16 +250,6 @@ contains
                        largest(worst(1:2)), phase)
         call t%at_most('tensor-body-over-long-runs-stays-on-the-orbit', largest(orbit), gathered)
     end subroutine check_tensor
-
-    pure function diagonal(values) result(matrix)
-        real(wp), intent(in) :: values(3)
-        real(wp) :: matrix(3, 3)
-
-        matrix = 0.0_wp
-        matrix(1, 1) = values(1)
-        matrix(2, 2) = values(2)
-        matrix(3, 3) = values(3)
-    end function diagonal
 
     !> The paper's exact steps, by other formulas throughout.
     subroutine check_paper_steps(t, samples)

@@ -1,6 +1,7 @@
 !> The two steps against Octave's ode45, as in section 4.1 of the paper; data/ode45 has the table.
 module frb_test_ode45
     use frb_checks, only: tally, worst_of
+    use frb_flow_samples, only: no_turn
     use frb_kinds, only: wp
     use frb_matrix_step, only: frb_step
     use frb_quat_step, only: quat_step
@@ -19,7 +20,6 @@ contains
 
     subroutine test_ode45(t)
         type(tally), intent(inout) :: t
-        real(wp), parameter :: no_turn(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
         real(wp) :: row(14), m(3), attitude(3, 3), q(4), worst(4)
         integer :: unit, io, count, stat, failures
 

@@ -2,13 +2,12 @@
 module frb_test_step_laws
     use frb_checks, only: tally, largest, worst_of
     use frb_claims, only: chain_norms, chain_space
-    use frb_flow_samples, only: no_rotation, no_turn
+    use frb_flow_samples, only: sample, random_samples, diagonal, no_rotation, no_turn
     use frb_inertia, only: principal_axes
     use frb_kinds, only: wp
     use frb_matrix_step, only: frb_step
     use frb_quat_step, only: quat_step
     use frb_rotations, only: quat_to_matrix, quat_rotate, norm3
-    use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
@@ -19,24 +18,14 @@ module frb_test_step_laws
     !> from no special case.
     real(wp), parameter :: two_steps = 4000*eps
 
-    !> A motion and a step, for the checks over many of them.
-    type :: sample
-        real(wp) :: moments(3), m(3), q(4), h
-    end type sample
-
 contains
 
     subroutine test_step_laws(t)
         type(tally), intent(inout) :: t
-        type(sample) :: samples(300)
-        integer(int64) :: seed
-        integer :: i
+        type(sample), allocatable :: samples(:)
 
         call t%open_suite('step-laws', 23)
-        seed = 903
-        do i = 1, size(samples)
-            call draw(samples(i), seed)
-        end do
+        samples = random_samples(300)
         call check_flow(t, samples)
         call check_relabelling(t, samples)
         call check_scaling(t, samples)
@@ -167,17 +156,6 @@ contains
         call t%at_most('tensor-moves-as-its-principal-moments', worst, two_steps)
     end subroutine check_tensor
 
-    pure function diagonal(values) result(matrix)
-        real(wp), intent(in) :: values(3)
-        real(wp) :: matrix(3, 3)
-        integer :: i
-
-        matrix = 0.0_wp
-        do i = 1, 3
-            matrix(i, i) = values(i)
-        end do
-    end function diagonal
-
     !> Semi-exact steps: the momentum is exact, the step is symmetric in time, many points are exact.
     subroutine check_quadrature(t, samples)
         type(tally), intent(inout) :: t
@@ -296,33 +274,5 @@ contains
         end do
         call t%at_most('near-separatrix-stays-on-its-orbit', worst, 64*eps)
     end subroutine check_separatrix
-
-    !> The next random motion: moments between 0.2 and 1, momentum and attitude any direction, |h| < 4.
-    subroutine draw(it, seed)
-        type(sample), intent(out) :: it
-        integer(int64), intent(inout) :: seed
-        integer :: i
-
-        do i = 1, 3
-            it%moments(i) = 0.2_wp + 0.8_wp*uniform()
-            it%m(i) = 2*uniform() - 1
-        end do
-        do i = 1, 4
-            it%q(i) = 2*uniform() - 1
-        end do
-        it%q = it%q/sqrt(sum(it%q**2))
-        it%h = 8*uniform() - 4
-
-    contains
-
-        !> Uniform on (0, 1), Lehmer's generator with multiplier 48271.
-        function uniform() result(x)
-            real(wp) :: x
-
-            seed = mod(48271_int64*seed, 2147483647_int64)
-            x = real(seed, wp)/2147483647.0_wp
-        end function uniform
-
-    end subroutine draw
 
 end module frb_test_step_laws

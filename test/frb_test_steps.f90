@@ -2,6 +2,7 @@
 module frb_test_steps
     use frb_checks, only: tally, largest, worst_of
     use frb_claims, only: matrix_median, matrix_largest, frame_median, frame_largest, orthogonal
+    use frb_flow_samples, only: no_rotation, no_turn
     use frb_kinds, only: wp
     use frb_matrix_step, only: frb_step
     use frb_quat_step, only: quat_step
@@ -20,10 +21,6 @@ module frb_test_steps
     !> Median and maximum of the scores in every group, of momentum, matrix, quaternion in each frame.
     real(wp), parameter :: units_matrix(2) = [matrix_median, matrix_largest]
     real(wp), parameter :: units_frame(2) = [frame_median, frame_largest]
-
-    real(wp), parameter :: no_turn(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-    real(wp), parameter :: identity(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, &
-                                                     0.0_wp, 0.0_wp, 1.0_wp], [3, 3])
 
 contains
 
@@ -53,10 +50,10 @@ contains
         allocate (score(size(cases), 5))
         defect = 0.0_wp
         do i = 1, size(cases)
-            call frb_step(m, a, cases(i)%h, cases(i)%moments, cases(i)%m0, identity)
+            call frb_step(m, a, cases(i)%h, cases(i)%moments, cases(i)%m0, no_rotation)
             score(i, 1) = score_momentum(cases(i), m)
             score(i, 2) = score_attitude(cases(i), matrix_to_quat(a))
-            defect = worst_of(defect, [abs(matmul(transpose(a), a) - identity)])
+            defect = worst_of(defect, [abs(matmul(transpose(a), a) - no_rotation)])
             do frame = 1, 3
                 call quat_step(m, q, cases(i)%h, cases(i)%moments, cases(i)%m0, no_turn, frame=frame)
                 score(i, 1) = worst_of(score(i, 1), score_momentum(cases(i), m))
@@ -127,7 +124,7 @@ contains
         call quat_step(m, q, time, moments, m0, no_turn)
         call t%close_to(name//'-in-one-step-with-its-sign', [m, q], [m_end, q_end], 256*eps)
         m = m0
-        a = identity
+        a = no_rotation
         do i = 1, 64
             call frb_step(m, a, time/64, moments, m, a)
         end do
@@ -153,16 +150,16 @@ contains
             expected = 0.0_wp
             expected(1) = cos(h/moments(axis))      ! half the angle 2 h/I
             expected(1 + axis) = -sin(h/moments(axis))
-            call frb_step(m, a, h, moments, e, identity)
+            call frb_step(m, a, h, moments, e, no_rotation)
             errors(axis) = largest([abs(q - expected), abs(a - quat_to_matrix(expected)), abs(m - e)])
         end do
         call t%at_most('axis-rotation-turns-about-its-axis', largest(errors), 4*eps)
 
-        call frb_step(m, a, h, [2.0_wp, 3.0_wp, 6.0_wp], sqrt(0.5_wp)*[1.0_wp, 0.0_wp, 1.0_wp], identity)
+        call frb_step(m, a, h, [2.0_wp, 3.0_wp, 6.0_wp], sqrt(0.5_wp)*[1.0_wp, 0.0_wp, 1.0_wp], no_rotation)
         call t%close_to('separatrix-follows-tanh-and-sech', m, &
                         [sqrt(0.5_wp)/cosh(h/6), tanh(h/6), sqrt(0.5_wp)/cosh(h/6)], 2*eps)
         call frb_step(m, a, 1.0e5_wp, [2.0_wp, 3.0_wp, 6.0_wp], sqrt(0.5_wp)*[1.0_wp, 0.0_wp, 1.0_wp], &
-                      identity)
+                      no_rotation)
         call t%close_to('separatrix-ends-at-the-middle-axis', m, [0.0_wp, 1.0_wp, 0.0_wp], 2*eps)
 
         call quat_step(m, q, h, [1.0_wp, 1.0_wp, 2.0_wp], m0, no_turn)
@@ -174,9 +171,9 @@ contains
 
         call quat_step(m, q, h, [1.0_wp, 2.0_wp, 3.0_wp], [0.0_wp, 0.0_wp, 0.0_wp], no_turn)
         call t%close_to('no-momentum-no-motion', [m, q], [0.0_wp, 0.0_wp, 0.0_wp, no_turn], 0.0_wp)
-        call frb_step(m, a, 0.0_wp, [1.0_wp, 2.0_wp, 3.0_wp], [0.3_wp, 0.2_wp, 0.1_wp], identity)
+        call frb_step(m, a, 0.0_wp, [1.0_wp, 2.0_wp, 3.0_wp], [0.3_wp, 0.2_wp, 0.1_wp], no_rotation)
         call t%close_to('no-time-no-change-of-momentum', m, [0.3_wp, 0.2_wp, 0.1_wp], 0.0_wp)
-        call t%close_to('no-time-no-turn', reshape(a, [9]), reshape(identity, [9]), 4*eps)
+        call t%close_to('no-time-no-turn', reshape(a, [9]), reshape(no_rotation, [9]), 4*eps)
     end subroutine check_special_motions
 
     !> Any finite input: a result, |m| kept, attitude orthogonal. Sizes over the whole range of numbers.
@@ -206,9 +203,9 @@ contains
                 frame = mod(l, 4)
                 np = merge(2, 0, mod(l, 7) == 0)
                 if (frame == 0) then
-                    call frb_step(m, a, h, bodies(:, body), m0, identity, np)
+                    call frb_step(m, a, h, bodies(:, body), m0, no_rotation, np)
                     finite = finite .and. all(ieee_is_finite(a))
-                    defect = worst_of(defect, [abs(matmul(transpose(a), a) - identity)])
+                    defect = worst_of(defect, [abs(matmul(transpose(a), a) - no_rotation)])
                 else
                     call quat_step(m, q, h, bodies(:, body), m0, no_turn, np, frame)
                     finite = finite .and. all(ieee_is_finite(q))
@@ -257,9 +254,9 @@ contains
         do i = 1, 5
             wrong = i0
             wrong(mod(i, 3) + 1) = bad(i)
-            call frb_step(m, a, 1.0_wp, wrong, m0, identity, stat=stat)
+            call frb_step(m, a, 1.0_wp, wrong, m0, no_rotation, stat=stat)
             call t%ok('matrix-step-refuses-bad-moment', stat == status_bad_moments &
-                      .and. all(abs(m - m0) <= 0.0_wp) .and. all(abs(a - identity) <= 0.0_wp))
+                      .and. all(abs(m - m0) <= 0.0_wp) .and. all(abs(a - no_rotation) <= 0.0_wp))
             call quat_step(m, q, 1.0_wp, wrong, m0, no_turn, stat=stat)
             call t%ok('quaternion-step-refuses-bad-moment', stat == status_bad_moments &
                       .and. all(abs(m - m0) <= 0.0_wp) .and. all(abs(q - no_turn) <= 0.0_wp))
@@ -267,15 +264,15 @@ contains
         do i = 1, 2
             wrong = m0
             wrong(2) = bad(i)
-            call frb_step(m, a, 1.0_wp, i0, wrong, identity, stat=stat)
+            call frb_step(m, a, 1.0_wp, i0, wrong, no_rotation, stat=stat)
             call t%equal('matrix-step-refuses-bad-momentum', stat, status_bad_momentum)
             call quat_step(m, q, 1.0_wp, i0, wrong, no_turn, stat=stat)
             call t%equal('quaternion-step-refuses-bad-momentum', stat, status_bad_momentum)
-            call frb_step(m, a, bad(i), i0, m0, identity, stat=stat)
+            call frb_step(m, a, bad(i), i0, m0, no_rotation, stat=stat)
             call t%equal('matrix-step-refuses-bad-time', stat, status_bad_time)
             call quat_step(m, q, bad(i), i0, m0, no_turn, stat=stat)
             call t%equal('quaternion-step-refuses-bad-time', stat, status_bad_time)
-            wrong_a = identity
+            wrong_a = no_rotation
             wrong_a(3, 1) = bad(i)
             call frb_step(m, a, 1.0_wp, i0, m0, wrong_a, stat=stat)
             call t%equal('matrix-step-refuses-bad-attitude', stat, status_bad_attitude)
@@ -288,11 +285,11 @@ contains
         call t%equal('quaternion-step-refuses-zero-quaternion', stat, status_bad_attitude)
         call quat_step(m, q, 1.0_wp, i0, m0, huge(1.0_wp)*no_turn, stat=stat)
         call t%equal('quaternion-step-refuses-absurd-quaternion', stat, status_bad_attitude)
-        call frb_step(m, a, 1.0_wp, i0, m0, -huge(1.0_wp)*identity, stat=stat)
+        call frb_step(m, a, 1.0_wp, i0, m0, -huge(1.0_wp)*no_rotation, stat=stat)
         call t%equal('matrix-step-refuses-absurd-matrix', stat, status_bad_attitude)
-        call frb_step(m, a, 1.0_wp, i0, m0, identity, -1, stat)
+        call frb_step(m, a, 1.0_wp, i0, m0, no_rotation, -1, stat)
         call t%equal('matrix-step-refuses-negative-number-of-points', stat, status_bad_count)
-        call frb_step(m, a, 1.0_wp, i0, m0, identity, huge(1), stat)
+        call frb_step(m, a, 1.0_wp, i0, m0, no_rotation, huge(1), stat)
         call t%equal('matrix-step-refuses-absurd-number-of-points', stat, status_bad_count)
         call quat_step(m, q, 1.0_wp, i0, m0, no_turn, -1, stat=stat)
         call t%equal('quaternion-step-refuses-negative-number-of-points', stat, status_bad_count)

@@ -8,7 +8,7 @@ module frb_test_tangent_laws
     use frb_rotations, only: cross, norm3
     use frb_status, only: status_ok, status_bad_momentum, status_bad_time, status_bad_attitude, &
         status_bad_moments, status_bad_count
-    use frb_tangent_cases, only: tangent_case, read_tangent_cases
+    use frb_tangent_cases, only: tangent_case, read_tangent_cases, hat
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan, ieee_positive_inf, ieee_is_nan, &
         ieee_is_finite
     use, intrinsic :: ieee_exceptions, only: ieee_overflow, ieee_get_halting_mode, ieee_set_halting_mode
@@ -109,14 +109,6 @@ contains
         r = r/unit_roundoff
         where (.not. r < 1.0e30_wp) r = 1.0e30_wp
     end function residuals
-
-    !> Matrix of the vector product with v.
-    pure function hat(v) result(x)
-        real(wp), intent(in) :: v(3)
-        real(wp) :: x(3, 3)
-
-        x = reshape([0.0_wp, v(3), -v(2), -v(3), 0.0_wp, v(1), v(2), -v(1), 0.0_wp], [3, 3])
-    end function hat
 
     !> Two steps are one, there and back is none, for bodies by moments, also with their inertia, and by a
     !> tensor.

@@ -11,6 +11,7 @@ module frb_test_tangent_runs
     use frb_splitting, only: integrate
     use frb_splitting_tangent, only: integrate_tangent
     use frb_status, only: status_bad_attitude, status_bad_count, status_not_offered
+    use frb_tangent_cases, only: hat
     implicit none
     private
 
@@ -28,14 +29,6 @@ contains
         call check_runs(t)
         call t%close_suite()
     end subroutine test_tangent_runs
-
-    !> Matrix of the vector product with v.
-    pure function hat(v) result(x)
-        real(wp), intent(in) :: v(3)
-        real(wp) :: x(3, 3)
-
-        x = reshape([0.0_wp, v(3), -v(2), -v(3), 0.0_wp, v(1), v(2), -v(1), 0.0_wp], [3, 3])
-    end function hat
 
     !> Om(m) of Phi^T Om(m') Phi = Om(m).
     pure function structure(m) result(x)
