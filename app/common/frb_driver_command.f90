@@ -1,7 +1,7 @@
 !> The command line of the driver programs: `driver_exampleN [INIT] [-o OUT]`, `--help`, `--version`; for
 !> example 1 also `--scheme NAME` and `--drift NAME`.
 !>
-!> What is wrong is said in one line on standard error, with exit code 1.
+!> Every error is one line on standard error, with exit code 1.
 module frb_driver_command
     use frb, only: scheme_names
     use frb_init_files, only: init_values, read_init_file
@@ -15,14 +15,14 @@ module frb_driver_command
 
     public :: run_command, read_command, begin_run, fail, fail_run, joined
 
-    !> What the command line says.
+    !> The contents of the command line.
     type :: run_command
         character(:), allocatable :: init_path, out_path
         character(:), allocatable :: scheme     !! its name, '' if none is given
         character(:), allocatable :: drift      !! its name, '' if none is given
     end type run_command
 
-    !> What each program computes, and what a record of its output holds.
+    !> For --help: the purpose of each program, and the contents of a record of its output.
     character(*), parameter :: purposes(0:4) = [character(80) :: &
         'the motion of a free rigid body, one step of size h, attitude a matrix', &
         'a heavy top, by splitting around the free rigid body', &
@@ -38,7 +38,7 @@ module frb_driver_command
 
 contains
 
-    !> Reads the init file, then opens the output. Comes back only if a run is to be made.
+    !> Reads the init file, then opens the output. An error ends the program.
     subroutine begin_run(example, command, values, out)
         integer, intent(in) :: example              !! 0 to 4
         type(run_command), intent(in) :: command
@@ -62,7 +62,7 @@ contains
         call c_exit(1_c_int)
     end subroutine fail
 
-    !> Ends a run that cannot go on, and removes what it wrote.
+    !> Ends a run that cannot go on, and removes its output.
     subroutine fail_run(out, message)
         type(out_file), intent(inout) :: out
         character(*), intent(in) :: message
@@ -71,7 +71,7 @@ contains
         call fail(message)
     end subroutine fail_run
 
-    !> The command line, with defaults where it says nothing.
+    !> Reads the command line; a missing init file or output has its default.
     subroutine read_command(example, command)
         integer, intent(in) :: example              !! 0 to 4
         type(run_command), intent(out) :: command
@@ -113,7 +113,7 @@ contains
         if (len(command%out_path) == 0) command%out_path = 'out_example'//digit//'.dat'
     end subroutine read_command
 
-    !> The value of an option, the argument after it.
+    !> Reads the value of an option, which is the argument after the option.
     subroutine take_value(option, what, i, value)
         character(*), intent(in) :: option, what
         integer, intent(inout) :: i                                 ! the option's place, then the value's

@@ -22,7 +22,7 @@ module frb_driver_top
 
 contains
 
-    !> Notes and writes a state; what happens between two calls is the time of a step.
+    !> Watches and writes a state. The time between two calls is the time of a step.
     subroutine write_record(self, step, t, m, q, stop)
         class(top_recorder), intent(inout) :: self
         integer(int64), intent(in) :: step
@@ -36,7 +36,7 @@ contains
         if (step > 0) call self%watch%end_step()
         attitude = matmul(self%start%attitude, quat_to_matrix(q))
         call self%watch%note(m, attitude, self%start%moments)
-        ! From the end of the run, so that the last time is Tfin to the last digit; t differs by rounding.
+        ! A part of Tfin, so that the last time is Tfin to the last digit; t differs by rounding.
         time = t
         if (step > 0) time = (real(step, wp)/self%start%steps)*self%start%t_final
         call self%out%write_record([m, reshape(attitude, [9]), time], error)

@@ -1,5 +1,5 @@
-!> What a driver tells about its run: progress while it lasts, and a summary of its cost and of how well
-!> the constants of the motion were kept.
+!> What a driver reports about its run: progress during the run, then a summary of the time spent and of the
+!> errors in the constants of the motion.
 module frb_driver_watch
     use frb_driver_command, only: fail
     use frb_kinds, only: wp
@@ -13,7 +13,7 @@ module frb_driver_watch
 
     public :: run_watch
 
-    !> Largest departures from the first record so far, and the time spent.
+    !> Largest differences from the first record, and the time spent.
     type :: run_watch
         integer, private :: steps = 0               !! of the whole run
         integer, private :: done = 0
@@ -39,7 +39,7 @@ module frb_driver_watch
 
 contains
 
-    !> Starts the watch over a run of so many steps. With `u0`, gravity in space, the run is a heavy top's:
+    !> Starts the watch over a run of `steps` steps. With `u0`, gravity in space, the run is a heavy top's:
     !> the energy is then T + u0.(Q e3), and of Q m only the part along u0 is a constant.
     subroutine begin(self, steps, u0)
         class(run_watch), intent(inout) :: self
@@ -65,15 +65,15 @@ contains
     !> Call after a step; shows progress about once a second if standard error is a terminal.
     subroutine end_step(self)
         class(run_watch), intent(inout) :: self
-        integer(int64) :: now
+        integer(int64) :: time
 
-        call system_clock(now)
-        self%ticks = self%ticks + (now - self%step_begun)
+        call system_clock(time)
+        self%ticks = self%ticks + (time - self%step_begun)
         self%done = self%done + 1
-        if (self%shows_progress) call self%show_progress(now)
+        if (self%shows_progress) call self%show_progress(time)
     end subroutine end_step
 
-    !> Takes in a record with the attitude as a matrix.
+    !> Watches a record with the attitude as a matrix.
     subroutine see_matrix(self, m, attitude, moments)
         class(run_watch), intent(inout) :: self
         real(wp), intent(in) :: m(3), attitude(3, 3), moments(3)
@@ -87,7 +87,7 @@ contains
         call self%see(m, matmul(attitude, m), moments, attitude(:, 3), maxval(abs(square)))
     end subroutine see_matrix
 
-    !> Takes in a record with the attitude as a quaternion.
+    !> Watches a record with the attitude as a quaternion.
     subroutine see_quaternion(self, m, q, moments)
         class(run_watch), intent(inout) :: self
         real(wp), intent(in) :: m(3), q(4), moments(3)
@@ -133,13 +133,13 @@ contains
         type(out_file), intent(inout) :: out
         type(out_file) :: summary
         character(:), allocatable :: error
-        integer(int64) :: now, rate
+        integer(int64) :: time, rate
         real(wp) :: size_of_m, size_of_up
         character(120) :: text
 
         call out%commit(error)
         if (allocated(error)) call fail(error)
-        call system_clock(now, rate)
+        call system_clock(time, rate)
         if (self%last_shown > self%run_begun) write (error_unit, '(a)') achar(13)//'steps done: all        '
         size_of_m = positive(self%norm0)
         call summary%open_for_writing(trim(merge('/dev/stderr', '-          ', out%descriptor == 1)), error)
@@ -149,7 +149,7 @@ contains
             ', to t =', self%steps*h
         call summary%write_line(trim(text))
         call line('  time per step', real(self%ticks, wp)/real(rate, wp)/max(1, self%done), ' s')
-        call line('  time of the run', real(now - self%run_begun, wp)/real(rate, wp), ' s, with writing')
+        call line('  time of the run', real(time - self%run_begun, wp)/real(rate, wp), ' s, with writing')
         call summary%write_line('  largest change over the run, relative:')
         if (self%torque) then
             size_of_up = positive(norm3(self%up))
@@ -185,7 +185,7 @@ contains
 
     end subroutine finish
 
-    !> A scale to divide by: one in the place of nothing.
+    !> A scale to divide by: one where the scale is zero.
     pure function positive(scale)
         real(wp), intent(in) :: scale
         real(wp) :: positive
@@ -194,15 +194,15 @@ contains
     end function positive
 
     !> Shows how far the run is, about once a second.
-    subroutine show_progress(self, now)
+    subroutine show_progress(self, time)
         class(run_watch), intent(inout) :: self
-        integer(int64), intent(in) :: now
+        integer(int64), intent(in) :: time
         integer(int64) :: rate, unused
 
         if (self%done == self%steps) return
         call system_clock(unused, rate)
-        if (now - self%last_shown < rate) return
-        self%last_shown = now
+        if (time - self%last_shown < rate) return
+        self%last_shown = time
         write (error_unit, '(a,i0,a,i0)', advance='no') achar(13)//'steps done: ', self%done, &
             ' of ', self%steps
         flush (error_unit)

@@ -8,18 +8,19 @@
 !> | 3 | h, Tfin, m(3), Q(9), I(3), np |
 !> | 4 | h, Tfin, m(3), q(4), I(3), np |
 !>
-!> Matrices stand column by column, quaternions scalar first; np = 0 means exact. What the numbers look
-!> like is said in `frb_number_files`. A file is rejected at its first number that cannot be meant.
+!> Matrices stand column by column, quaternions scalar first; np = 0 means exact. `frb_number_files` has the
+!> form of the numbers. A file is rejected at its first invalid number.
 module frb_init_files
     use frb_kinds, only: wp, most_points
     use frb_number_files, only: number_file
     use frb_out_files, only: is_special
+    use frb_rotations, only: cross
     implicit none
     private
 
     public :: init_values, read_init_file, whole_steps
 
-    !> The contents of an init file; what a file does not hold keeps its default.
+    !> The contents of an init file; items that the file does not hold keep their defaults.
     type :: init_values
         real(wp) :: a(8) = 0.0_wp           !! coefficients of the free body, up to the centre of the scheme
         real(wp) :: b(7) = 0.0_wp           !! coefficients of the kick, up to the centre
@@ -34,13 +35,21 @@ module frb_init_files
         integer :: points = 0               !! Gauss points, np; 0: exact
     end type init_values
 
-    !> How far from orthogonal an attitude matrix may be, and the coefficients' sums from one: files
+    !> Largest distance of an attitude matrix from orthogonal, and of a sum of coefficients from one: files
     !> with seven digits pass, mistyped digits do not.
     real(wp), parameter :: consistency_tolerance = 1.0e-6_wp
 
     !> A quotient Tfin/h short of a whole number by this part of itself, and by no more than a hundredth,
     !> counts as whole.
     real(wp), parameter :: quotient_tolerance = 1.0e-8_wp
+
+    !> The items of an example, for messages.
+    character(*), parameter :: contents(0:4) = [character(50) :: &
+        'h, I(3), m(3), Q(9)', &
+        'a1..a8, b1..b7, h, Tfin, m(3), Q(9), I(3), u0(3)', &
+        'h, I(3), m(3), q(4)', &
+        'h, Tfin, m(3), Q(9), I(3), np', &
+        'h, Tfin, m(3), q(4), I(3), np']
 
     !> Most steps of a run.
     integer, parameter :: most_steps = 2000000000
@@ -49,9 +58,9 @@ contains
 
     !> Reads the init file of an example.
     !>
-    !> The published programs read every item from a line of its own and drop what is left on the line; here
-    !> items may share a line. A file that is refused is therefore read again in the published way: if that
-    !> succeeds, the error is about the first number that would be dropped, on its line.
+    !> The published programs read every item from a line of its own and drop further words on the line; here
+    !> items may share a line. So a file that is refused is read again in the published way. If this succeeds,
+    !> the error names the first number that was dropped.
     subroutine read_init_file(path, example, values, error, output)
         character(*), intent(in) :: path                    !! -: standard input
         integer, intent(in) :: example                      !! 0 to 4
@@ -61,7 +70,6 @@ contains
         type(number_file) :: file
         type(init_values) :: by_lines
         character(:), allocatable :: again
-        logical :: same
 
         if (example < 0 .or. example > 4) then
             error = trim(path)//': there is no init file of this example'
@@ -70,8 +78,7 @@ contains
         call file%open_for_reading(path, error)
         if (allocated(error)) return
         if (present(output)) then
-            same = file%is_file(output)
-            if (same .and. .not. is_special(output)) then
+            if (file%is_file(output) .and. .not. is_special(output)) then
                 error = file%path//': is the input, it cannot be the output too'
             end if
         end if
@@ -81,14 +88,15 @@ contains
                 call file%start_over(by_lines=.true.)
                 call read_items(file, example, by_lines, again)
                 if (allocated(file%surplus) .and. .not. allocated(again)) error = file%surplus
-                error = error//' (example '//achar(iachar('0') + example)//' has '//contents(example)//')'
+                error = error//' (example '//achar(iachar('0') + example)//' has '// &
+                        trim(contents(example))//')'
                 values = init_values()
             end if
         end if
         call file%close_file()
     end subroutine read_init_file
 
-    !> Reads all items of an example, and nothing must be left.
+    !> Reads all items of an example; a number after the last item is an error.
     subroutine read_items(file, example, values, error)
         type(number_file), intent(inout) :: file
         integer, intent(in) :: example
@@ -108,7 +116,7 @@ contains
 
     !> The number of steps N = int(Tfin/h) of a run to t_final in steps near h, both of one sign; 0 when
     !> there is no such number (h or t_final zero, of different signs, h beyond t_final, more than 2e9
-    !> steps). A quotient that is whole but for rounding, 0.3/0.1 = 2.9999999999999996, counts as whole.
+    !> steps). A quotient that is whole up to rounding, 0.3/0.1 = 2.9999999999999996, counts as whole.
     elemental function whole_steps(t_final, h) result(steps)
         real(wp), intent(in) :: t_final     !! end of the run; finite
         real(wp), intent(in) :: h           !! wanted step; finite
@@ -117,14 +125,14 @@ contains
 
         steps = 0
         if (.not. (abs(h) > 0.0_wp .and. (t_final > 0.0_wp .eqv. h > 0.0_wp))) return
-        ! Divided first by the largest count: a quotient beyond it is never formed.
+        ! t_final is divided by the largest count: the quotient with h could overflow.
         if (abs(t_final)/most_steps >= abs(h)) return
         quotient = t_final/h
         steps = int(quotient)
         if (steps + 1 - quotient <= min(quotient_tolerance*quotient, 0.01_wp)) steps = steps + 1
     end function whole_steps
 
-    !> Reads one item and checks what can be checked so far.
+    !> Reads one item and checks it.
     subroutine read_item(file, letter, values, error)
         type(number_file), intent(inout) :: file
         character, intent(in) :: letter
@@ -200,10 +208,10 @@ contains
         type(number_file), intent(in) :: file
         real(wp), intent(in) :: matrix(3, 3)
         character(:), allocatable, intent(out) :: error
-        real(wp) :: defect(3, 3), determinant
+        real(wp) :: defect(3, 3)
         integer :: i
 
-        ! Entries first: the product must not overflow.
+        ! Entries first: the product could overflow.
         if (maxval(abs(matrix)) > 2.0_wp) then
             error = file%complaint('Q', 'an orthogonal matrix, column by column', &
                                    'an entry of magnitude '//text(maxval(abs(matrix))))
@@ -218,13 +226,12 @@ contains
                                    'one that misses Q^T Q = 1 by '//text(maxval(abs(defect))))
             return
         end if
-        determinant = dot_product(matrix(:, 1), [matrix(2, 2)*matrix(3, 3) - matrix(3, 2)*matrix(2, 3), &
-                                                 matrix(3, 2)*matrix(1, 3) - matrix(1, 2)*matrix(3, 3), &
-                                                 matrix(1, 2)*matrix(2, 3) - matrix(2, 2)*matrix(1, 3)])
-        if (determinant < 0.0_wp) error = file%complaint('Q', 'a rotation', 'a reflection (determinant -1)')
+        if (dot_product(matrix(:, 1), cross(matrix(:, 2), matrix(:, 3))) < 0.0_wp) then
+            error = file%complaint('Q', 'a rotation', 'a reflection (determinant -1)')
+        end if
     end subroutine check_attitude
 
-    !> Any quaternion but zero is an attitude; one of norm one to rounding stays as it is.
+    !> Scales a quaternion to norm one, unless its norm is one to rounding; zero is an error.
     subroutine normalise(file, q, error)
         type(number_file), intent(in) :: file
         real(wp), intent(inout) :: q(4)
@@ -256,25 +263,6 @@ contains
             end if
         end do
     end subroutine check_moments
-
-    !> What the init file of an example holds, for messages.
-    pure function contents(example) result(list)
-        integer, intent(in) :: example
-        character(:), allocatable :: list
-
-        select case (example)
-        case (0)
-            list = 'h, I(3), m(3), Q(9)'
-        case (1)
-            list = 'a1..a8, b1..b7, h, Tfin, m(3), Q(9), I(3), u0(3)'
-        case (2)
-            list = 'h, I(3), m(3), q(4)'
-        case (3)
-            list = 'h, Tfin, m(3), Q(9), I(3), np'
-        case default
-            list = 'h, Tfin, m(3), q(4), I(3), np'
-        end select
-    end function contents
 
     !> A number in few characters.
     pure function text(number)

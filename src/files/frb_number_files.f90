@@ -1,36 +1,31 @@
-!> Files of numbers, read item by item as Fortran's list-directed input reads them; every error tells its
-!> file, line and item.
+!> Files of numbers, read item by item as Fortran's list-directed input reads them. Every error message names
+!> the file, the line and the item.
 !>
 !> Values stand between blanks, tabs or line ends, with at most one comma between two of them; `3*0.5` stands
 !> for three. A number is an optional sign, digits with an optional point, and an optional exponent: E, D or
-!> Q, in either case, and a whole number, or that number with its sign alone (`1+5`). Words behind the last
-!> number of an item are passed over to the end of the line. A list-directed read leaves a variable unset for
-!> nothing between commas, for `3*` and for a slash: here they are errors.
+!> Q, in either case, and a whole number; or a signed whole number alone (`1+5`). Words after the last number
+!> of an item are ignored to the end of the line. A list-directed read leaves a variable unset where two
+!> commas have nothing between them, for `3*` and for a slash: here these are errors.
 !>
-!> Beyond that, a comment runs from # or ! to the end of its line, several items may share a line, and a byte
-!> order mark of UTF-8 is skipped. Errors are values: `error` comes back allocated when something is wrong, as
-!> one line of text.
+!> Further, a comment runs from # or ! to the end of its line, several items may share a line, and a byte
+!> order mark of UTF-8 is skipped. If something is wrong, `error` comes back allocated, as one line of text.
 module frb_number_files
     use frb_kinds, only: wp
     use frb_number_words, only: is_blank, is_too_large, is_value, quoted, split_value
-    use frb_system, only: c_realpath
-    use, intrinsic :: iso_c_binding, only: c_associated, c_null_char
+    use frb_system, only: without_links
     use, intrinsic :: iso_fortran_env, only: input_unit
     implicit none
     private
 
     public :: number_file, largest_magnitude
 
-    !> Numbers beyond this are refused: squares and products of two of them stay finite.
+    !> Larger numbers are refused: squares and products of two accepted numbers stay finite.
     real(wp), parameter :: largest_magnitude = 1.0e100_wp
 
-    !> Longest line accepted, so that a file without line ends is refused in time.
+    !> Longest line accepted: a file without line ends is refused before it fills the memory.
     integer, parameter :: longest_line = 100000
 
-    !> Longest path that links may lead to.
-    integer, parameter :: longest_path = 4096
-
-    !> Characters taken from the file at a time.
+    !> Number of characters that one read takes from the file.
     integer, parameter :: piece = 512
 
     !> A line of the file that is not blank, without its comment.
@@ -39,8 +34,8 @@ module frb_number_files
         character(:), allocatable :: text
     end type text_line
 
-    !> A file open for reading, and the place reached in it. Its lines are kept, so that standard input too
-    !> can be read from the first number again.
+    !> A file open for reading, and the place reached in it. Its lines are kept, so that any file, standard
+    !> input too, can be read again from the first number.
     type :: number_file
         character(:), allocatable :: path           !! as the caller gave it
         integer :: line_number = 0                  !! of the number read last; 0 before the first
@@ -50,13 +45,13 @@ module frb_number_files
         character(:), allocatable, private :: last      !! name of the item read last, with its size
         character(:), allocatable, private :: word      !! the number read last, as it is written
         real(wp), private :: value = 0.0_wp         !! the number read last
-        integer, private :: repeats = 0             !! how many more times it comes
+        integer, private :: repeats = 0             !! how many more times this number is to be given
         logical, private :: comma_may_follow = .false.
-        logical, private :: by_lines = .false.      !! every item begins a line
+        logical, private :: by_lines = .false.      !! every item starts on a new line
         integer, private :: kept = 0                !! number of lines kept
-        integer, private :: current = 0             !! where the next number is looked for: a line kept,
-        integer, private :: position = 1            !! and a place in it
-        integer, private :: lines_read = 0          !! blank ones too
+        integer, private :: current = 0             !! the kept line that holds the place reached
+        integer, private :: position = 1            !! the place in this line
+        integer, private :: lines_read = 0          !! number of lines read, blank lines too
         integer, private :: unit = 0
         logical, private :: at_end = .false.
     contains
@@ -99,7 +94,7 @@ contains
         if (io /= 0) error = self%path//': cannot be opened for reading'
     end subroutine open_for_reading
 
-    !> Whether a path leads to the file that is open here, by whatever name or link.
+    !> Whether a path leads to the file that is open here, by any name or link.
     function is_file(self, path) result(same)
         class(number_file), intent(in) :: self
         character(*), intent(in) :: path
@@ -107,27 +102,16 @@ contains
         character(:), allocatable :: real_path
         integer :: unit, io
 
-        ! Most compilers know an open file by any of its names, some by the one it was opened with.
+        ! Most compilers find an open file by any of its names, some only by the name it was opened with.
         inquire (file=path, number=unit, iostat=io)
         same = io == 0 .and. unit == self%unit
-        if (same) return
         real_path = without_links(path)
-        same = len(real_path) > 0 .and. real_path == without_links(self%path)
+        if (.not. same .and. len(real_path) > 0) same = real_path == without_links(self%path)
     end function is_file
 
-    !> A path from the root without links and dots; '' if there is no such file.
-    function without_links(path) result(whole)
-        character(*), intent(in) :: path
-        character(:), allocatable :: whole
-        character(longest_path) :: text
-
-        whole = ''
-        text = ''
-        if (c_associated(c_realpath(path//c_null_char, text))) whole = text(:index(text, c_null_char) - 1)
-    end function without_links
-
-    !> Goes back to the first number. With `by_lines` every item then begins a line, as if each were read by a
-    !> statement of its own: numbers left on a line are dropped, and `surplus` tells the first of them.
+    !> Goes back to the first number. With `by_lines` every item then starts on a new line, as if each were
+    !> read by a statement of its own: numbers left on a line are dropped, and `surplus` names the first of
+    !> them.
     subroutine start_over(self, by_lines)
         class(number_file), intent(inout) :: self
         logical, intent(in) :: by_lines
@@ -178,8 +162,8 @@ contains
         self%last = item//trim(number)
     end subroutine read_numbers
 
-    !> Complains if a number is left: on the line of the last item, or on the lines after it up to the first
-    !> that begins with another word.
+    !> An error if a number follows the last item: on its line, or on the next line that is not blank. A line
+    !> that starts with another word ends the search.
     subroutine expect_end(self, error)
         class(number_file), intent(inout) :: self
         character(:), allocatable, intent(out) :: error
@@ -195,7 +179,7 @@ contains
         error = self%complaint('after '//self%last, 'the end of the file', quoted(self%word))
     end subroutine expect_end
 
-    !> One line that says where something is wrong, what was expected there and what was found.
+    !> The error message: the place, what was expected there, and what was found.
     pure function complaint(self, item, expected, found) result(error)
         class(number_file), intent(in) :: self
         character(*), intent(in) :: item, expected, found
@@ -206,8 +190,8 @@ contains
         error = self%path//', line '//trim(number)//': '//item//': expected '//expected//', found '//found
     end function complaint
 
-    !> What is left on the line of the last item belongs to the next one if it begins with a number; other
-    !> words, and with `by_lines` numbers too, are passed over.
+    !> Finds where the next item starts. If a number follows the last item on its line, the next item starts
+    !> with this number, unless `by_lines`. Otherwise the end of the line is skipped.
     subroutine begin_item(self)
         class(number_file), intent(inout) :: self
         logical :: goes_on
@@ -285,7 +269,7 @@ contains
         value = self%value
     end subroutine next_number
 
-    !> Goes on to the next character that is not blank, on whatever line it is.
+    !> Goes on to the next character that is not blank, on this line or on a later one.
     subroutine find_word(self, found, error)
         class(number_file), intent(inout) :: self
         logical, intent(out) :: found                       !! false at the end of the file

@@ -1,4 +1,5 @@
-!> Words of a file of numbers: what is a number, or stands for some, as Fortran's list-directed input has it.
+!> Words of a file of numbers, by the rules of Fortran's list-directed input: one number, or a count, a star
+!> and a number, which stands for that many equal numbers.
 module frb_number_words
     implicit none
     private
@@ -17,7 +18,7 @@ contains
         blank = character == ' ' .or. iachar(character) == 9 .or. iachar(character) == 13
     end function is_blank
 
-    !> Whether a word stands for one number or for some: a number, or a count, a star and a number.
+    !> Whether a word stands for one or more numbers.
     pure function is_value(word) result(value)
         character(*), intent(in) :: word
         logical :: value
@@ -28,8 +29,8 @@ contains
         value = count > 0
     end function is_value
 
-    !> The number in a word, with its exponent behind an E, and how many times the word stands for it: 0 times
-    !> if there is none.
+    !> The number in a word, with its exponent after an E, and its count; the count is 0 if the word is no
+    !> number.
     pure subroutine split_value(word, count, number)
         character(*), intent(in) :: word
         integer, intent(out) :: count
@@ -64,9 +65,9 @@ contains
         end if
     end subroutine split_value
 
-    !> Whether a number is beyond `largest_magnitude`, from its text: converting first would overflow.
+    !> Whether a number is beyond 1e100, found in its text: a conversion could overflow.
     pure function is_too_large(number) result(too_large)
-        character(*), intent(in) :: number  !! with its exponent behind an E
+        character(*), intent(in) :: number  !! with its exponent after an E
         logical :: too_large
         character(:), allocatable :: mantissa, exponent_text
         integer :: split, point, leading, exponent, io
@@ -88,7 +89,7 @@ contains
             read (exponent_text, *, iostat=io) exponent
         end if
         if (number(split + 1:split + 1) == '-') exponent = -exponent
-        ! Power of ten of the first digit that is not 0.
+        ! The power of ten of the first digit that is not 0.
         exponent = exponent + point - leading
         if (leading < point) exponent = exponent - 1
         too_large = exponent > 100
@@ -99,17 +100,17 @@ contains
     end function is_too_large
 
     !> A word without its sign.
-    pure function unsigned(word) result(rest)
+    pure function unsigned(word) result(without)
         character(*), intent(in) :: word
-        character(:), allocatable :: rest
+        character(:), allocatable :: without
 
-        rest = word
+        without = word
         if (len(word) > 0) then
-            if (word(1:1) == '+' .or. word(1:1) == '-') rest = word(2:)
+            if (word(1:1) == '+' .or. word(1:1) == '-') without = word(2:)
         end if
     end function unsigned
 
-    !> A word in quotes, cut at 40 characters, with ? for what cannot be printed.
+    !> A word in quotes, at most 40 characters of it, with ? for each character that cannot be printed.
     pure function quoted(word) result(text)
         character(*), intent(in) :: word
         character(:), allocatable :: text

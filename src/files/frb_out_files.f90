@@ -1,17 +1,17 @@
-!> Output files: lines of text or of numbers, and no file that looks complete unless the run was.
+!> Output files: lines of text or of numbers. A file gets its name only after a complete run.
 !>
-!> Lines go to a temporary file of this process beside the wanted one (`frb-PROCESS.part`), which takes the
-!> wanted name only when `commit` is called; until then an older file of that name stays as it was. A link is
-!> followed: the file it leads to is replaced. What cannot be replaced is written directly: standard output
-!> (`-` or /dev/stdout), devices and pipes.
+!> Lines go to a temporary file of this process (`frb-PROCESS-NUMBER.part`) in the folder of the wanted file.
+!> `commit` gives this file the wanted name; until then an older file of that name stays as it was. A link is
+!> followed: the file that it leads to is replaced. Standard output (`-` or /dev/stdout), devices and pipes
+!> cannot be replaced and are written directly.
 !>
 !> Each number has 17 significant digits, so reading it back gives the same double. Gnuplot and list-directed
-!> reads take the lines as they are. The calls are those of C and POSIX, which tell when a disk is full;
-!> run-time libraries of Fortran do not always.
+!> reads accept the lines. All writing is done by C and POSIX, which report a full disk; the run-time
+!> libraries of Fortran do not always.
 module frb_out_files
     use frb_kinds, only: wp
     use frb_system, only: c_fclose, c_fdopen, c_fflush, c_fopen, c_ftell, c_fwrite, c_geteuid, c_getpid, &
-        c_readlink, c_realpath, c_remove, c_rename
+        c_readlink, c_remove, c_rename, longest_path, without_links
     use, intrinsic :: iso_c_binding, only: c_associated, c_int, c_null_char, c_null_ptr, c_ptr, c_size_t
     use, intrinsic :: iso_fortran_env, only: int64
     implicit none
@@ -19,12 +19,9 @@ module frb_out_files
 
     public :: out_file, is_special
 
-    !> How a number is written, and how many characters that takes.
+    !> Format of a number, and its number of characters.
     character(*), parameter :: record_format = '(*(es25.16e3))'
     integer, parameter :: number_width = 25
-
-    !> Longest path that a link may lead to.
-    integer, parameter :: longest_path = 4096
 
     !> An output file, from `open_for_writing` to `commit` or `discard`.
     type :: out_file
@@ -33,7 +30,7 @@ module frb_out_files
         character(:), allocatable, private :: target_path   !! where its links lead to
         character(:), allocatable, private :: temporary     !! '' if it is written directly
         type(c_ptr), private :: stream = c_null_ptr
-        integer(int64), private :: length = 0   !! so far, in bytes
+        integer(int64), private :: length = 0   !! of all lines written, in bytes
         logical, private :: broken = .false.    !! something could not be written
     contains
         procedure :: open_for_writing
@@ -48,7 +45,7 @@ module frb_out_files
 
 contains
 
-    !> Opens the temporary file, or what is written directly.
+    !> Opens the temporary file, or the device, pipe or standard output that is written directly.
     subroutine open_for_writing(self, path, error)
         class(out_file), intent(out) :: self
         character(*), intent(in) :: path                    !! -: standard output; no blanks at its end
@@ -88,7 +85,7 @@ contains
         if (.not. c_associated(self%stream)) error = self%path//': cannot be opened for writing'
     end subroutine open_for_writing
 
-    !> Writes one line of text. What cannot be written is an error, here or in `commit` at the latest.
+    !> Writes one line of text. If this fails, the error comes back here, or from `commit` at the latest.
     subroutine write_line(self, text, error)
         class(out_file), intent(inout) :: self
         character(*), intent(in) :: text
@@ -120,7 +117,7 @@ contains
 
         call self%close_stream()
         if (len(self%temporary) > 0) then
-            ! Closed first: only then the length is that on the disk.
+            ! The stream is closed: the system tells the length on the disk.
             inquire (file=self%temporary, size=length)
             if (length /= self%length) self%broken = .true.
         end if
@@ -133,7 +130,7 @@ contains
         if (allocated(error)) call self%discard()
     end subroutine commit
 
-    !> Removes what was written so far.
+    !> Closes and removes the temporary file.
     subroutine discard(self)
         class(out_file), intent(inout) :: self
         logical :: removed
@@ -153,7 +150,7 @@ contains
 
     ! ------------------------------------------------------------------------------------------ inner parts
 
-    !> Makes a file of this process beside the wanted one: no other process and no user has one of its name.
+    !> Makes the temporary file, under a name that no other file has.
     subroutine open_temporary(self)
         class(out_file), intent(inout) :: self
         integer, parameter :: most_tried = 1000000
@@ -171,7 +168,7 @@ contains
         end do
     end subroutine open_temporary
 
-    !> Writes what is left in memory, and closes a file.
+    !> Writes the characters still in memory, and closes a file; standard output stays open.
     subroutine close_stream(self)
         class(out_file), intent(inout) :: self
         integer(c_int) :: failed
@@ -186,7 +183,7 @@ contains
         self%stream = c_null_ptr
     end subroutine close_stream
 
-    !> The error of what cannot be written.
+    !> The message of an error of writing.
     pure function full(self) result(error)
         class(out_file), intent(in) :: self
         character(:), allocatable :: error
@@ -194,8 +191,8 @@ contains
         error = self%path//': cannot be written (is the disk full?)'
     end function full
 
-    !> The path to which a path leads by links, so that a new file takes the place of the last one; '' if
-    !> there are too many of them. Names under /dev/ and /proc/ are left as they are.
+    !> The path at the end of a chain of links, '' if the chain has more than 40 links. A new file takes the
+    !> place of the file there, and the links stay. Paths under /dev/ and /proc/ come back unchanged.
     function followed(path) result(name)
         character(*), intent(in) :: path
         character(:), allocatable :: name
@@ -214,8 +211,8 @@ contains
         name = ''
     end function followed
 
-    !> Whether nobody has the right to write to an existing file. Root can write to it all the same, which the
-    !> system tells for other users only: the command `find` sees the rights themselves.
+    !> Whether nobody has the right to write to an existing file, asked for root only, who can write to such a
+    !> file all the same. The command `find` shows the rights; opening the file does not.
     function is_marked_read_only(path) result(read_only)
         character(*), intent(in) :: path
         logical :: read_only
@@ -235,16 +232,13 @@ contains
         read_only = command_code == 0 .and. code == 0
     end function is_marked_read_only
 
-    !> Whether an existing file is a device, by whatever name.
+    !> Whether an existing file is a device, by any name or link.
     function is_device(path) result(device)
         character(*), intent(in) :: path
         logical :: device
-        character(longest_path) :: text
 
         device = is_special(path)
-        if (device) return
-        if (.not. c_associated(c_realpath(path//c_null_char, text))) return
-        device = is_special(text(:index(text, c_null_char)))
+        if (.not. device) device = is_special(without_links(path))
     end function is_device
 
     !> The folder of a path, with its slash; '' if it has none.

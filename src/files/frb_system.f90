@@ -1,15 +1,20 @@
-!> What is called of C and POSIX: streams that tell when a disk is full, names of files, the process.
+!> The routines of C and POSIX that the library calls, for streams that report a full disk, names of files and
+!> the process, and a few words on top of them.
 module frb_system
-    use, intrinsic :: iso_c_binding, only: c_char, c_int, c_intptr_t, c_long, c_ptr, c_size_t
+    use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_intptr_t, c_long, c_null_char, &
+        c_ptr, c_size_t
     implicit none
     private
 
     public :: c_fopen, c_fdopen, c_fwrite, c_ftell, c_fflush, c_fclose
-    public :: full_files_are_errors
-    public :: c_rename, c_remove, c_readlink, c_realpath, c_getpid, c_geteuid, c_isatty, c_exit
+    public :: full_files_are_errors, without_links, longest_path
+    public :: c_rename, c_remove, c_readlink, c_getpid, c_geteuid, c_isatty, c_exit
+
+    !> Longest path that links may lead to.
+    integer, parameter :: longest_path = 4096
 
     interface
-        !> C: opens a file; a null pointer if that cannot be done.
+        !> C: opens a file; comes back with a null pointer if the file cannot be opened.
         function c_fopen(path, mode) bind(c, name='fopen') result(stream)
             import :: c_char, c_ptr
             implicit none
@@ -17,7 +22,7 @@ module frb_system
             type(c_ptr) :: stream
         end function c_fopen
 
-        !> POSIX: opens a descriptor that is open already: 1 is standard output, 2 standard error.
+        !> POSIX: a stream of a descriptor that is open: 1 is standard output, 2 standard error.
         function c_fdopen(descriptor, mode) bind(c, name='fdopen') result(stream)
             import :: c_char, c_int, c_ptr
             implicit none
@@ -26,7 +31,7 @@ module frb_system
             type(c_ptr) :: stream
         end function c_fdopen
 
-        !> C: writes so many items of a size; comes back with the number that was written.
+        !> C: writes a number of items of one size; comes back with the number of items written.
         function c_fwrite(text, item, items, stream) bind(c, name='fwrite') result(written)
             import :: c_char, c_ptr, c_size_t
             implicit none
@@ -36,7 +41,7 @@ module frb_system
             integer(c_size_t) :: written
         end function c_fwrite
 
-        !> C: the place in a stream, negative if it has none, as a pipe.
+        !> C: the place in a stream, negative if the stream has no places, as a pipe.
         function c_ftell(stream) bind(c, name='ftell') result(place)
             import :: c_long, c_ptr
             implicit none
@@ -44,7 +49,7 @@ module frb_system
             integer(c_long) :: place
         end function c_ftell
 
-        !> C: writes what is left in memory; 0 if done.
+        !> C: writes the characters of a stream that are still in memory; 0 if done.
         function c_fflush(stream) bind(c, name='fflush') result(failed)
             import :: c_int, c_ptr
             implicit none
@@ -52,7 +57,7 @@ module frb_system
             integer(c_int) :: failed
         end function c_fflush
 
-        !> C: the same, and closes the stream.
+        !> C: writes the characters still in memory and closes the stream; 0 if done.
         function c_fclose(stream) bind(c, name='fclose') result(failed)
             import :: c_int, c_ptr
             implicit none
@@ -60,7 +65,7 @@ module frb_system
             integer(c_int) :: failed
         end function c_fclose
 
-        !> C: gives a file another name in one step, replacing a file that had it; 0 if done.
+        !> C: gives a file another name in one step, and replaces a file of that name; 0 if done.
         function c_rename(old, new) bind(c, name='rename') result(failed)
             import :: c_char, c_int
             implicit none
@@ -76,7 +81,7 @@ module frb_system
             integer(c_int) :: failed
         end function c_remove
 
-        !> POSIX: where a link leads to, and the length of that, negative if it is no link.
+        !> POSIX: the path that a link holds, and its length, negative if `path` is no link.
         function c_readlink(path, text, size) bind(c, name='readlink') result(length)
             import :: c_char, c_size_t
             implicit none
@@ -86,7 +91,7 @@ module frb_system
             integer(c_size_t) :: length
         end function c_readlink
 
-        !> POSIX: the name of a file without links, into a text of 4096 characters; null if there is none.
+        !> POSIX: the path of a file without links, into a text of 4096 characters; null if there is no file.
         function c_realpath(path, text) bind(c, name='realpath') result(name)
             import :: c_char, c_ptr
             implicit none
@@ -117,14 +122,14 @@ module frb_system
             integer(c_int) :: terminal
         end function c_isatty
 
-        !> C: ends the program with an exit code and, unlike `stop`, without a word.
+        !> C: ends the program with an exit code; unlike `stop` it prints nothing.
         subroutine c_exit(code) bind(c, name='exit')
             import :: c_int
             implicit none
             integer(c_int), value :: code
         end subroutine c_exit
 
-        !> C: what is to be done when a signal comes in; comes back with what was done before.
+        !> C: sets the action for a signal; comes back with the action before.
         function c_signal(signal, action) bind(c, name='signal') result(before)
             import :: c_int, c_intptr_t
             implicit none
@@ -136,8 +141,8 @@ module frb_system
 
 contains
 
-    !> From here on a file that grows beyond the limit of the shell is an error of writing, as a full disk is,
-    !> and not the end of the program.
+    !> Makes a file that grows beyond the limit of the shell an error of writing, like a full disk; otherwise
+    !> the signal of the system ends the program.
     subroutine full_files_are_errors()
         integer(c_int), parameter :: file_too_large = 25
         integer(c_intptr_t), parameter :: ignored = 1
@@ -145,5 +150,16 @@ contains
 
         before = c_signal(file_too_large, ignored)
     end subroutine full_files_are_errors
+
+    !> The path of a file from the root, without links and dots; '' if there is no such file.
+    function without_links(path) result(whole)
+        character(*), intent(in) :: path
+        character(:), allocatable :: whole
+        character(longest_path) :: text
+
+        whole = ''
+        text = ''
+        if (c_associated(c_realpath(path//c_null_char, text))) whole = text(:index(text, c_null_char) - 1)
+    end function without_links
 
 end module frb_system
