@@ -53,7 +53,8 @@ contains
         q_end = start_q
         call taylor_top(real(top%moments, qp), real(top%force, qp), real(span, qp), m_end, q_end)
         enough = merge(0.3e-3_wp, 1.0e-3_wp, options%quick)
-        allocate (times(merge(3, 9, options%quick .or. span > 1000), size(solvers)))
+        ! Long spans once, in a run of its own: they last long enough to be timed.
+        allocate (times(merge(1, merge(3, 9, options%quick), span > 1000), size(solvers)))
         do k = 1, settings_of_solver
             do i = 1, size(solvers)
                 setting(k, i) = setting_of(solvers(i), top, k)

@@ -9,15 +9,20 @@
 !> | wanted | take |
 !> |--------|------|
 !> | a state at a time, to an accuracy, up to some 10 000 turns | `extrapolate` (frb_extrapolation) |
-!> | long runs and many bodies, symplectic and reversible | `fg6a` |
-!> | the same where a torque is dear and the scene does not tell its change | `srkn14` |
-!> | the same with a small torque, |V| much smaller than T | `fg6b`; `aba1064`, `aba864` likewise |
+!> | long runs and many bodies, symplectic and reversible | `fg6a` or `srkn14`, from 1e-9 on `fg8` |
+!> | the same with a small torque, |V| much smaller than T | `fg6b` |
+!> | where a torque is dear and the scene does not tell its change | `srkn14`; `aba864`, `aba1064` if small |
 !> | last digits, very long runs | the same, `compensated` |
 !> | low accuracy, molecular dynamics with smooth forces | `srkn6`, `fg4`; with kinked forces `strang` |
 !>
-!> Time to an error of the attitude of 1e-9, T = 100, one core of an EPYC, [us]: Hairer-Vilmart top
-!> extrapolate 181, fg6a 470, srkn14 740, and the plain equations by DOP853 375; the paper's top 21, fg6b 40,
-!> aba864 62, DOP853 65. The chart program's `heavy-top` makes the table.
+!> Time [us] to an error of the attitude of 1e-9 at T = 100, one core of an EPYC at 3 GHz, AVX2:
+!>
+!> | top | extrapolate | fg6a | fg6b | fg8 | srkn14 | aba864 | DOP853 on m and q |
+!> |-----|-------------|------|------|-----|--------|--------|-------------------|
+!> | Hairer-Vilmart, strong torque | 186 | 756 | 941 | 695 | 775 | 849 | 390 |
+!> | the paper's, weak torque | 21 | 80 | 49 | 86 | 78 | 55 | 63 |
+!>
+!> The chart program's `heavy-top` makes the pictures, for T = 10 and 10 000 too.
 module frb_splitting
     use frb_free_flow, only: rigid_body
     use frb_kinds, only: wp
