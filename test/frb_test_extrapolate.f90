@@ -23,7 +23,7 @@ contains
     subroutine test_extrapolate(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('extrapolate', 76)
+        call t%open_suite('extrapolate', 79)
         call test_order(t)
         call test_tolerances(t)
         call test_free(t)
@@ -40,21 +40,22 @@ contains
         type(top_case) :: item
         type(extrapolation_report) :: report
         real(wp) :: m(3), q(4), error(2), seen, m_ref(3), q_ref(4), h
-        integer, parameter :: steps(2, 2:3) = reshape([12, 18, 26, 34], [2, 2])
+        integer, parameter :: steps(2, 3) = reshape([15, 23, 12, 18, 26, 34], [2, 3])
         integer :: i, k
 
-        do k = 2, 3
-            item = known_top(k)
+        do k = 1, 3
+            item = known_top(max(k, 2))
             do i = 1, 2
                 m = item%m0
                 q = item%q0
-                call extrapolate(item%body, item%top, item%t, m, q, 0.0_wp, step=item%t/steps(i, k), &
-                                 report=report)
+                ! The tolerance chooses the sequences: the first time those for the last digits.
+                call extrapolate(item%body, item%top, item%t, m, q, merge(0.0_wp, 1.0e-9_wp, k == 1), &
+                                 step=item%t/steps(i, k), report=report)
                 error(i) = distance(m, q, item%m, item%q)
                 call t%equal('fixed-steps-are-as-many-as-asked-for', int(report%steps), steps(i, k))
             end do
             seen = log(error(1)/error(2))/log(real(steps(2, k), wp)/steps(1, k))
-            if (k == 2) call t%close_to('order-fourteen-shows', seen, 14.0_wp, 1.0_wp)
+            if (k < 3) call t%close_to('order-fourteen-shows', seen, 14.0_wp, 1.0_wp)
             if (k == 3) call t%ok('order-fourteen-is-kept-or-passed', seen > 13.0_wp)
         end do
         do k = 1, 3
@@ -63,7 +64,7 @@ contains
                 h = merge(3.0_wp, 0.4_wp, k == 1)*i
                 m = item%m0
                 q = item%q0
-                call extrapolate(item%body, item%top, h, m, q, 0.0_wp, step=h, report=report)
+                call extrapolate(item%body, item%top, h, m, q, 1.0e-9_wp, step=h, report=report)
                 m_ref = item%m0
                 q_ref = item%q0
                 call integrate(item%body, splitting_scheme('srkn17'), item%top, h/100, 100, m_ref, q_ref, &

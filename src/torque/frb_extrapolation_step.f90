@@ -15,34 +15,52 @@ module frb_extrapolation_step
 
     public :: extrapolated_body, new_extrapolated_body, ask_torque, try_step, accept_step, rounding
 
-    integer, parameter :: sequences = 7, stages = 9
-    integer, parameter :: substeps(sequences) = [2, 3, 4, 5, 6, 7, 8]
+    ! Two sets of seven sequences, each of order 14: 2..8, and for the last digits 1..6 and 8, whose weights
+    ! are four times smaller. Lanes: 8, 7 + 2, 6 + 3, 5 + 4; 8, 6 + 2, 5 + 3, 4 + 1.
+    integer, parameter :: most_stages = 9, stages(2) = [9, 8]
     !> Number of substeps of the sequence that a lane is at in each stage, and which of them; 0: it rests.
-    integer, parameter :: number(lanes, stages) = reshape([8, 7, 6, 5, 8, 7, 6, 5, 8, 7, 6, 5, 8, 7, 6, 5, &
-                                                           8, 7, 6, 5, 8, 7, 6, 4, 8, 7, 3, 4, 8, 2, 3, 4, &
-                                                           0, 2, 3, 4], [lanes, stages])
-    integer, parameter :: which(lanes, stages) = reshape([1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, &
-                                                          5, 5, 5, 5, 6, 6, 6, 1, 7, 7, 1, 2, 8, 1, 2, 3, &
-                                                          0, 2, 3, 4], [lanes, stages])
+    integer, parameter :: number(lanes, most_stages, 2) = reshape([ &
+        8, 7, 6, 5, 8, 7, 6, 5, 8, 7, 6, 5, 8, 7, 6, 5, 8, 7, 6, 5, &
+        8, 7, 6, 4, 8, 7, 3, 4, 8, 2, 3, 4, 0, 2, 3, 4, 8, 6, 5, 4, &
+        8, 6, 5, 4, 8, 6, 5, 4, 8, 6, 5, 4, 8, 6, 5, 1, 8, 6, 3, 0, &
+        8, 2, 3, 0, 8, 2, 3, 0, 0, 0, 0, 0], [lanes, most_stages, 2])
+    integer, parameter :: which(lanes, most_stages, 2) = reshape([ &
+        1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 5, 5, 5, 5, &
+        6, 6, 6, 1, 7, 7, 1, 2, 8, 1, 2, 3, 0, 2, 3, 4, 1, 1, 1, 1, &
+        2, 2, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 5, 5, 5, 1, 6, 6, 1, 0, &
+        7, 1, 2, 0, 8, 2, 3, 0, 0, 0, 0, 0], [lanes, most_stages, 2])
     !> Of a step of one: half of each drift, the kick before it, the time after it.
-    real(wp), parameter :: half(lanes, stages) = merge(0.5_wp/max(number, 1), 0.0_wp, number > 0)
-    real(wp), parameter :: kick(lanes, stages) = half*merge(1, 2, which == 1)
-    real(wp), parameter :: begin(lanes, stages) = merge(1.0_wp, 0.0_wp, which == 1)
-    logical, parameter :: any_begins(stages) = [.false., .false., .false., .false., .true., .true., .true., &
-                                                .false., .false.]   !! after the stage
-    real(wp), parameter :: time_after(lanes, stages) = merge(real(which, wp)/max(number, 1), 1.0_wp, &
-                                                             number > 0)
-    real(wp), parameter :: weights(2:8) = &
-        [2.0_wp**12/(108864000.0_wp), 3.0_wp**12/(-33264000.0_wp), 4.0_wp**12/(23950080.0_wp), &
-         5.0_wp**12/(-31135104.0_wp), 6.0_wp**12/(69189120.0_wp), 7.0_wp**12/(-277992000.0_wp), &
-         8.0_wp**12/(2594592000.0_wp)]
-    real(wp), parameter :: differences(2:8) = weights*4/[4, 9, 16, 25, 36, 49, 64]
-    real(wp), parameter :: last_kicks(2:8) = 0.5_wp/[2, 3, 4, 5, 6, 7, 8]
-    !> Lanes that end a sequence in each stage, from the first to the last of them.
-    integer, parameter :: ends_first(stages) = [lanes + 1, lanes + 1, lanes + 1, lanes + 1, 4, 3, 2, 1, 2]
+    real(wp), parameter :: half(lanes, most_stages, 2) = merge(0.5_wp/max(number, 1), 0.0_wp, number > 0)
+    real(wp), parameter :: kick(lanes, most_stages, 2) = half*merge(1, 2, which == 1)
+    real(wp), parameter :: time_after(lanes, most_stages, 2) = merge(real(which, wp)/max(number, 1), 1.0_wp, &
+                                                                    number > 0)
+    !> Lanes that begin a sequence with a stage, and whether there are any after a stage.
+    real(wp), parameter :: begin(lanes, most_stages, 2) = merge(1.0_wp, 0.0_wp, which == 1)
+    logical, parameter :: any_begins(most_stages, 2) = reshape([ &
+        .false., .false., .false., .false., .true., .true., .true., .false., .false., &
+        .false., .false., .false., .true., .true., .true., .false., .false., .false.], [most_stages, 2])
+    !> Lanes that end a sequence with a stage, from the first to the last of them.
+    integer, parameter :: first_end(most_stages, 2) = reshape([5, 5, 5, 5, 4, 3, 2, 1, 2, &
+                                                               5, 5, 5, 4, 3, 2, 5, 1, 5], [most_stages, 2])
+    integer, parameter :: last_end(most_stages, 2) = reshape([4, 4, 4, 4, 4, 3, 2, 1, 4, &
+                                                              4, 4, 4, 4, 4, 2, 4, 3, 4], [most_stages, 2])
+    !> Weights c_n = n^12/prod_(j /= n) (n^2 - j^2), and those less the weights without the coarsest sequence.
+    real(wp), parameter :: weights(8, 2) = reshape( &
+        [0.0_wp, 2.0_wp**12/(108864000.0_wp), 3.0_wp**12/(-33264000.0_wp), &
+         4.0_wp**12/(23950080.0_wp), 5.0_wp**12/(-31135104.0_wp), 6.0_wp**12/(69189120.0_wp), &
+         7.0_wp**12/(-277992000.0_wp), 8.0_wp**12/(2594592000.0_wp), &
+         1.0_wp**12/(19051200.0_wp), 2.0_wp**12/(-7257600.0_wp), 3.0_wp**12/(6652800.0_wp), &
+         4.0_wp**12/(-10886400.0_wp), 5.0_wp**12/(31135104.0_wp), 6.0_wp**12/(-186278400.0_wp), &
+         0.0_wp, 8.0_wp**12/(10897286400.0_wp)], [8, 2])
+    integer, parameter :: squares(8) = [1, 4, 9, 16, 25, 36, 49, 64]
+    real(wp), parameter :: differences(8, 2) = reshape([weights(:, 1)*4/squares, weights(:, 2)/squares], &
+                                                       [8, 2])
+    real(wp), parameter :: last_kicks(8) = 0.5_wp/[1, 2, 3, 4, 5, 6, 7, 8]
 
     !> Attitudes at which the torque is asked for in a step, but for the start.
-    integer, parameter :: torques_of_step = sum(substeps)
+    integer, parameter :: torques_of_step(2) = [35, 29]
+    !> Tolerances below this take the second set.
+    real(wp), parameter :: fine = 1.0e-13_wp
     !> Error of a step by rounding, relative: seen in the estimate at half a radian a step.
     real(wp), parameter :: rounding = 5.0e-15_wp
 
@@ -51,6 +69,7 @@ module frb_extrapolation_step
         type(body_core) :: core
         logical :: other_axes = .false.                 !! the axes of m, q and torque are not principal
         logical :: compensated = .true.
+        integer :: set = 1                              !! of sequences
         real(wp) :: norm = 1.0_wp                       !! square of the norm of q, which is kept
         real(wp) :: x(7) = 0.0_wp                       !! m and q
         real(wp) :: rest(7) = 0.0_wp
@@ -65,14 +84,16 @@ module frb_extrapolation_step
 contains
 
     !> A body in the state (m, q), axes of the body.
-    pure function new_extrapolated_body(core, m, q, compensated) result(self)
+    pure function new_extrapolated_body(core, m, q, compensated, tolerance) result(self)
         type(body_core), intent(in) :: core
         real(wp), intent(in) :: m(3), q(4)
         logical, intent(in) :: compensated
+        real(wp), intent(in) :: tolerance
         type(extrapolated_body) :: self
 
         self%core = core
         self%compensated = compensated
+        if (tolerance < fine) self%set = 2
         self%norm = sum(q*q)
         ! The constants of a linear rotor are those of a sphere, in any axes.
         self%other_axes = core%needs_rotation .and. .not. core%linear
@@ -115,9 +136,10 @@ contains
         type(form_of_step) :: form
         type(state_of_lanes) :: now
         real(wp) :: start(7), rest(7), change(7), error(7), sizes(lanes), time(lanes), largest
-        integer :: j, l, e, refused
+        integer :: j, l, e, set, refused
 
         code = status_ok
+        set = self%set
         form = chosen_form(self%core, self%x(1:3))
         do e = 1, 3
             start(e) = self%x(form%axis(e))
@@ -132,32 +154,32 @@ contains
         sizes = 0.0_wp
         change = 0.0_wp
         error = 0.0_wp
-        call begin_sequences(begin(:, 1), start, rest, self%tau, now)
+        call begin_sequences(begin(:, 1, set), start, rest, self%tau, now)
         associate (i1 => form%axis(1), i2 => form%axis(2), i3 => form%axis(3))
-            do j = 1, stages
+            do j = 1, stages(set)
                 if (exact) then
-                    call kick_and_drift_exactly(self%core, form, h, half(:, j), kick(:, j), now, sizes)
+                    call kick_and_drift_exactly(self%core, form, h, half(:, j, set), kick(:, j, set), now, &
+                                                sizes)
                 else
-                    call kick_and_drift(form, h, half(:, j), kick(:, j), now%tau(:, i1), now%tau(:, i2), &
-                                        now%tau(:, i3), now%m, now%q(:, 1), now%q(:, 1 + i1), &
-                                        now%q(:, 1 + i2), now%q(:, 1 + i3), now%m_rest, now%q_rest(:, 1), &
-                                        now%q_rest(:, 1 + i1), now%q_rest(:, 1 + i2), &
+                    call kick_and_drift(form, h, half(:, j, set), kick(:, j, set), now%tau(:, i1), &
+                                        now%tau(:, i2), now%tau(:, i3), now%m, now%q(:, 1), &
+                                        now%q(:, 1 + i1), now%q(:, 1 + i2), now%q(:, 1 + i3), now%m_rest, &
+                                        now%q_rest(:, 1), now%q_rest(:, 1 + i1), now%q_rest(:, 1 + i2), &
                                         now%q_rest(:, 1 + i3), sizes)
                 end if
-                time = t + h*time_after(:, j)
+                time = t + h*time_after(:, j, set)
                 call torque_of_lanes(self, scene, time, now%q, now%tau, refused)
                 if (code == status_ok) code = refused
-                do l = ends_first(j), merge(ends_first(j), lanes, j < stages)
-                    if (l > lanes) exit
-                    call end_sequence(l, number(l, j))
+                do l = first_end(j, set), last_end(j, set)
+                    call end_sequence(l, number(l, j, set))
                 end do
-                if (any_begins(j)) call begin_sequences(begin(:, j + 1), start, rest, self%tau, now)
+                if (any_begins(j, set)) call begin_sequences(begin(:, j + 1, set), start, rest, self%tau, now)
             end do
             self%change([i1, i2, i3]) = change(1:3)
             self%change(i3) = form%sign3*change(3)
         end associate
         self%change(4:7) = change(4:7)
-        asked = asked + torques_of_step
+        asked = asked + torques_of_step(set)
         self%error = 1.0_wp
         self%is_free = .false.
         self%is_finite = ieee_is_finite(sum(sizes) + sum(abs(change)))
@@ -175,8 +197,8 @@ contains
             real(wp) :: last(3), result, weight, difference
             integer :: e
 
-            weight = weights(n)
-            difference = differences(n)
+            weight = weights(n, set)
+            difference = differences(n, set)
             do e = 1, 3
                 last(e) = last_kicks(n)*h*now%tau(l, form%axis(e))
                 sizes(l) = sizes(l) + abs(last(e))
