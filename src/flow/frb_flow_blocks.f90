@@ -30,7 +30,7 @@ contains
     !> the last one. Lanes that are not plain, those of refused bodies among them, have constants 0.
     pure subroutine set_bodies(body, bodies, h, times, first, count, block)
         integer, intent(in) :: bodies, times, first, count
-        type(body_core), intent(in) :: body(bodies)
+        type(body_core), intent(in) :: body(:)
         real(wp), intent(in) :: h(times)
         type(block_of_bodies), intent(inout) :: block
         real(wp) :: t(lanes), axis
@@ -74,7 +74,7 @@ contains
     !> Constants of bodies as columns.
     pure subroutine gather(body, bodies, first, count, full, block)
         integer, intent(in) :: bodies, first, count, full
-        type(body_core), intent(in) :: body(bodies)
+        type(body_core), intent(in) :: body(:)
         type(block_of_bodies), intent(inout) :: block
         integer :: l, given, before
 

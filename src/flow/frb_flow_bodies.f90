@@ -20,7 +20,7 @@ contains
     !> h(:). The blocks are independent: with -fopenmp they are shared among the threads.
     subroutine flow_many(body, bodies, h, times, n, m, code, q)
         integer, intent(in) :: bodies, times, n     !! bodies and times: 1 or n
-        type(body_core), intent(in) :: body(bodies)
+        type(body_core), intent(in) :: body(:)
         real(wp), intent(in) :: h(times)
         real(wp), intent(inout) :: m(3, n)
         integer, intent(out) :: code
@@ -49,7 +49,7 @@ contains
     !> Whether the only body or the only time is refused, and so all states are.
     pure subroutine check_many(body, bodies, h, times, code)
         integer, intent(in) :: bodies, times
-        type(body_core), intent(in) :: body(bodies)
+        type(body_core), intent(in) :: body(:)
         real(wp), intent(in) :: h(times)
         integer, intent(out) :: code
 
@@ -62,7 +62,7 @@ contains
     !> One block: in place if all is plain and the lanes are whole vectors.
     subroutine flow_rows(body, bodies, h, times, first, count, block, m, refused, q)
         integer, intent(in) :: bodies, times, first, count
-        type(body_core), intent(in) :: body(bodies)
+        type(body_core), intent(in) :: body(:)
         real(wp), intent(in) :: h(times)
         type(block_of_bodies), intent(in) :: block
         real(wp), intent(inout) :: m(3, count)

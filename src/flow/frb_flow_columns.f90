@@ -19,7 +19,7 @@ contains
     !> As flow_many, on columns; q0 to q3 all or none. The results are those of flow_many to the last digits.
     subroutine flow_columns(body, bodies, h, times, n, m1, m2, m3, code, q0, q1, q2, q3)
         integer, intent(in) :: bodies, times, n     !! bodies and times: 1 or n
-        type(body_core), intent(in) :: body(bodies)
+        type(body_core), intent(in) :: body(:)
         real(wp), intent(in) :: h(times)
         real(wp), intent(inout) :: m1(n), m2(n), m3(n)
         integer, intent(out) :: code

@@ -198,7 +198,7 @@ contains
         linear = self%core%linear
     end function body_is_linear
 
-    !> The cores of bodies, in place; for library modules.
+    !> The cores of bodies, in place: `bodies%core` as an argument would be copied. For library modules.
     function cores_of(bodies) result(cores)
         type(rigid_body), intent(in), target :: bodies(:)
         type(body_core), pointer :: cores(:)
@@ -336,7 +336,7 @@ contains
 
     !> Advances the momenta of the n bodies body(:).
     subroutine flow_momenta_of_bodies(body, h, m, stat)
-        type(rigid_body), intent(in) :: body(:)             !! (n)
+        type(rigid_body), intent(in), target :: body(:)     !! (n)
         real(wp), intent(in) :: h
         real(wp), intent(inout), contiguous :: m(:, :)      !! (3, n)
         integer, intent(out), optional :: stat
@@ -344,14 +344,14 @@ contains
 
         code = status_bad_count
         if (size(m, 1) == 3 .and. size(body) == size(m, 2)) then
-            call flow_many(body%core, size(body), [h], 1, size(m, 2), m, code)
+            call flow_many(cores_of(body), size(body), [h], 1, size(m, 2), m, code)
         end if
         call conclude(code, 'free_flow', stat)
     end subroutine flow_momenta_of_bodies
 
     !> Advances the momenta and attitudes of the n bodies body(:).
     subroutine flow_quaternions_of_bodies(body, h, m, q, stat)
-        type(rigid_body), intent(in) :: body(:)             !! (n)
+        type(rigid_body), intent(in), target :: body(:)     !! (n)
         real(wp), intent(in) :: h
         real(wp), intent(inout), contiguous :: m(:, :)      !! (3, n)
         real(wp), intent(inout), contiguous :: q(:, :)      !! (4, n)
@@ -361,7 +361,7 @@ contains
         code = status_bad_count
         if (size(m, 1) == 3 .and. size(q, 1) == 4 .and. size(m, 2) == size(q, 2) &
             .and. size(body) == size(m, 2)) then
-            call flow_many(body%core, size(body), [h], 1, size(m, 2), m, code, q)
+            call flow_many(cores_of(body), size(body), [h], 1, size(m, 2), m, code, q)
         end if
         call conclude(code, 'free_flow', stat)
     end subroutine flow_quaternions_of_bodies

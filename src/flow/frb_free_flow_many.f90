@@ -164,7 +164,7 @@ contains
 
     !> n states in rows of m, and of q when present.
     subroutine rows(core, h, n, m, stat, q)
-        type(body_core), intent(in), contiguous :: core(:)
+        type(body_core), intent(in) :: core(:)
         real(wp), intent(in), contiguous :: h(:)
         integer, intent(in) :: n
         real(wp), intent(inout), contiguous :: m(:, :)
@@ -186,7 +186,7 @@ contains
     !> n states with matrices: the turns of a chunk as quaternions, then the matrices by them. A matrix that
     !> is not finite is refused as a quaternion of norm zero is.
     subroutine matrices(core, h, n, m, a, stat)
-        type(body_core), intent(in), contiguous :: core(:)
+        type(body_core), intent(in) :: core(:)
         real(wp), intent(in), contiguous :: h(:)
         integer, intent(in) :: n
         real(wp), intent(inout), contiguous :: m(:, :), a(:, :, :)
@@ -223,7 +223,7 @@ contains
 
     !> n states in columns.
     subroutine columns(core, h, n, m1, m2, m3, stat, q0, q1, q2, q3)
-        type(body_core), intent(in), contiguous :: core(:)
+        type(body_core), intent(in) :: core(:)
         real(wp), intent(in), contiguous :: h(:)
         integer, intent(in) :: n
         real(wp), intent(inout), contiguous :: m1(:), m2(:), m3(:)
