@@ -42,13 +42,15 @@ contains
 
     !> Advances m, and q when present, by h. `body` has status_ok and its own axes are principal.
     !> code: status_ok, or why the input was refused (it is then untouched).
-    pure recursive subroutine flow_one(body, h, m, code, q, scaled)
+    pure recursive subroutine flow_one(body, h, m, code, q, scaled, increment)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: h
         real(wp), intent(inout) :: m(3)
         integer, intent(out) :: code
         real(wp), intent(inout), optional :: q(4)
         logical, intent(in), optional :: scaled     !! present: by flow_rescaled, which is not called again
+        real(wp), intent(inout), optional :: increment(3)   !! of m, not rounded to its digits; after a long
+                                                            !! step as it was
         real(wp) :: t, a, b, g, m1, m2, m3, gg, p, r, nu_first, nu_mirror, rate
         real(wp) :: y, scd, u, w, k, a23, b31, g12, d1, d2, d3
         real(wp) :: nu, v0, v1, v2, v3, angle, twist, cosm1, along, dot, square, change, w0, w1, w2, w3, q3
@@ -71,7 +73,7 @@ contains
         plain = are_plain(size_m, size_q, t, body%a(1))
         if (.not. plain) then
             code = status_bad_momentum
-            if (.not. present(scaled)) call flow_rescaled(body, h, m, code, q)
+            if (.not. present(scaled)) call flow_rescaled(body, h, m, code, q, increment)
             return
         end if
         code = status_ok
@@ -81,7 +83,7 @@ contains
             if (square <= largest_square_angle .or. present(scaled)) then
                 call long_step(body, t, m, q)
             else
-                call flow_rescaled(body, h, m, code, q)
+                call flow_rescaled(body, h, m, code, q, increment)
             end if
             return
         end if
@@ -115,6 +117,7 @@ contains
         m(i1) = m1 + d1
         m(i2) = m2 + d2
         m(i3) = body%parity*(m3 + d3)
+        if (present(increment)) increment([i1, i2, i3]) = [d1, d2, body%parity*d3]
         if (.not. present(q)) return
 
         ! Of the two mirror forms the one with the smaller parameter nu of the third kind.
@@ -174,7 +177,7 @@ contains
         real(wp), intent(inout) :: m(3)
         integer, intent(out) :: code
         real(wp), intent(inout), optional :: q(4)
-        real(wp) :: n(3), old(3), upright(3), change(4), size_q
+        real(wp) :: n(3), old(3), increment(3), upright(3), change(4), size_q
 
         code = status_bad_momentum
         if (.not. all(ieee_is_finite(m))) return
@@ -198,17 +201,21 @@ contains
         end if
         old = matmul(m, body%axes)
         n = old
+        increment = 0.0_wp
         if (present(q)) then
             change = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-            call flow_one(body, h, n, code, change)
+            call flow_one(body, h, n, code, change, increment=increment)
         else
-            call flow_one(body, h, n, code)
+            call flow_one(body, h, n, code, increment=increment)
         end if
         if (code /= status_ok) return
+        ! n - old has no digits below those of m: where the axes are all but aligned, what they mix in would
+        ! be rounded away in every step, and |m| would drift.
+        if (maxval(abs(increment)) <= 0.0_wp) increment = n - old
         if (present(q)) then
-            call turn_back(body, n - old, change, m, q)
+            call turn_back(body, increment, change, m, q)
         else
-            m = m + matmul(body%axes, n - old)
+            m = m + matmul(body%axes, increment)
         end if
     end subroutine flow_in_principal_axes
 
@@ -233,12 +240,13 @@ contains
 
     !> The same flow with momentum, moments and time scaled by powers of 2 to the middle of the exponents; a
     !> time so long that no digit of any phase is left is cut to where the arithmetic holds.
-    pure recursive subroutine flow_rescaled(body, h, m, code, q)
+    pure recursive subroutine flow_rescaled(body, h, m, code, q, increment)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: h
         real(wp), intent(inout) :: m(3)
         integer, intent(out) :: code
         real(wp), intent(inout), optional :: q(4)
+        real(wp), intent(inout), optional :: increment(3)
         integer, parameter :: cut = 64     ! angles of 2^64 and more have no phase
         type(body_core) :: scaled
         real(wp) :: largest, time
@@ -272,12 +280,13 @@ contains
         if (present(q)) then
             eq = exponent(maxval(abs(q)))
             q = scale(q, -eq)
-            call flow_one(scaled, time, m, code, q, .true.)
+            call flow_one(scaled, time, m, code, q, .true., increment)
             q = scale(q, eq)
         else
-            call flow_one(scaled, time, m, code, scaled=.true.)
+            call flow_one(scaled, time, m, code, scaled=.true., increment=increment)
         end if
         m = scale(m, em)
+        if (present(increment)) increment = scale(increment, em)
     end subroutine flow_rescaled
 
     include 'plain_numbers.inc'
