@@ -10,7 +10,8 @@ module frb_test_tangent_runs
     use frb_schemes, only: splitting_scheme
     use frb_splitting, only: integrate
     use frb_splitting_tangent, only: integrate_tangent
-    use frb_status, only: status_bad_attitude, status_bad_count, status_not_offered
+    use frb_status, only: status_bad_attitude, status_bad_count, status_bad_moments, status_bad_time, &
+        status_bad_torque, status_not_offered
     use frb_tangent_cases, only: hat
     implicit none
     private
@@ -24,7 +25,7 @@ contains
     subroutine test_tangent_runs(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('tangent-runs', 11)
+        call t%open_suite('tangent-runs', 16)
         call check_composition(t)
         call check_runs(t)
         call t%close_suite()
@@ -80,7 +81,7 @@ contains
         type(heavy_top) :: top
         type(splitting_scheme) :: scheme
         real(wp) :: m0(3), q0(4), m(3), q(4), phi(6, 6), differences(6, 6), ends(7, 2), move(6), residual, &
-            time
+            time, other_q(4)
         integer :: k, side, code
 
         body = rigid_body(moments)
@@ -117,6 +118,20 @@ contains
         call t%equal('run-of-a-negative-number-of-steps', code, status_bad_count)
         call integrate_tangent(body, splitting_scheme('fg4'), top, 0.1_wp, 1, m, q, phi, stat=code)
         call t%equal('run-with-modified-kicks', code, status_not_offered)
+        other_q = (1 + 2.0e-6_wp)*q
+        call integrate_tangent(body, scheme, top, 0.1_wp, 1, m, other_q, phi, stat=code)
+        call t%equal('run-from-a-quaternion-of-another-norm', code, status_bad_attitude)
+        other_q = 2*q
+        call integrate_tangent(body, scheme, top, 0.1_wp, 0, m, other_q, phi, stat=code)
+        call t%equal('run-of-no-steps-from-a-quaternion-of-another-norm', code, status_bad_attitude)
+        call integrate_tangent(rigid_body(-moments), scheme, top, 0.1_wp, 0, m, q, phi, stat=code)
+        call t%equal('run-of-no-steps-of-no-body', code, status_bad_moments)
+        time = huge(time)
+        call integrate_tangent(body, scheme, top, 0.1_wp, 1, m, q, phi, time, code)
+        call t%equal('run-from-a-time-beyond-all-limits', code, status_bad_time)
+        top%force = huge(1.0_wp)
+        call integrate_tangent(body, scheme, top, 0.1_wp, 1, m, q, phi, stat=code)
+        call t%equal('run-under-a-torque-beyond-all-limits', code, status_bad_torque)
         motion = free_motion(body, m0, q0)
         call motion%tangent(7.0_wp, phi)
         m = m0

@@ -2,10 +2,14 @@
 module frb_splitting_tangent
     use frb_free_flow, only: flow_tangent, rigid_body
     use frb_kinds, only: wp
+    use frb_rotations, only: is_unit_quat
     use frb_schemes, only: splitting_scheme
-    use frb_splitting_plan, only: next_time, splitting_plan
-    use frb_status, only: conclude, status_ok, status_bad_count, status_not_offered
+    use frb_splitting_plan, only: check_run, next_time, splitting_plan
+    use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_momentum, status_bad_torque, &
+        status_not_offered
     use frb_torque, only: body_scene
+    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+    use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
@@ -17,9 +21,11 @@ contains
     !> on (dm, dtheta) as in `flow_tangent`. A kick adds plan%kick (d tau/d theta) dtheta to dm, by the
     !> scene's `torque_change` along the three axes of the body; that of `heavy_top` is there.
     !>
-    !> q must have norm one. For long runs call it again and again and keep what of the variations is wanted.
-    !> Refused with `stat`, state and t untouched, the derivative 1: what `splitting_plan`, `flow_tangent` and
-    !> the scene refuse; nsteps < 0 (`status_bad_count`); a scene without `torque_change` and a scheme with
+    !> q must have norm one, to 1e-6. For long runs call it again and again and keep what of the variations is
+    !> wanted.
+    !> Refused with `stat`, state and t untouched, the derivative 1: what `integrate` refuses at the start,
+    !> with its codes; what `flow_tangent` and the scene refuse later; a torque or its change that is not finite
+    !> (`status_bad_torque`); a scene without `torque_change` and a scheme with
     !> modified kicks (`status_not_offered`).
     subroutine integrate_tangent(body, scheme, scene, h, nsteps, m, q, transition, t, stat)
         type(rigid_body), intent(in) :: body
@@ -34,20 +40,19 @@ contains
         real(wp), parameter :: axes(3, 3) = reshape([1, 0, 0, 0, 1, 0, 0, 0, 1]*1.0_wp, [3, 3])
         type(splitting_plan) :: plan
         real(wp) :: m_now(3), q_now(4), phi(6, 6), tau(3), change(3, 3), now, one(6, 6)
-        integer :: code, step, i, k
+        integer :: code, step, i, k, spacing
 
+        call check_run(body%status(), scheme, h, int(nsteps, int64), spacing, now, code, t=t)
+        if (code == status_ok .and. .not. all(ieee_is_finite(m))) code = status_bad_momentum
+        if (code == status_ok .and. .not. is_unit_quat(q)) code = status_bad_attitude
         plan = splitting_plan(scheme, h)
-        code = plan%status
-        if (code == status_ok .and. nsteps < 0) code = status_bad_count
-        if (any(abs(plan%modified) > 0.0_wp)) code = status_not_offered
+        if (code == status_ok .and. any(abs(plan%modified) > 0.0_wp)) code = status_not_offered
         one = 0.0_wp
         one(1:3, 1:3) = axes
         one(4:6, 4:6) = axes
         transition = one
         m_now = m
         q_now = q
-        now = 0.0_wp
-        if (present(t)) now = t
         do step = 1, nsteps
             do i = 1, plan%stages + 1
                 if (code == status_ok) call flow_tangent(body, plan%drift(i), m_now, q_now, phi, code)
@@ -59,6 +64,8 @@ contains
                     if (code == status_ok) call scene%torque_change(q_now, now + plan%time(i), axes(:, k), &
                                                                     change(:, k), code)
                 end do
+                if (code == status_ok .and. .not. (all(ieee_is_finite(m_now)) .and. &
+                                                   all(ieee_is_finite(change)))) code = status_bad_torque
                 if (code == status_ok) transition(1:3, :) = transition(1:3, :) &
                                                             + plan%kick(i)*matmul(change, transition(4:6, :))
             end do
