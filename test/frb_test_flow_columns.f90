@@ -267,7 +267,7 @@ contains
         type(tally), intent(inout) :: t
         type(sample), intent(in) :: some
         real(wp) :: m(3, n), q(4, n), a(3, 3, n), x(n, 3), y(n, 0:3)
-        integer :: stat(9)
+        integer :: stat(11)
 
         m = some%m
         q = some%q
@@ -285,6 +285,8 @@ contains
         call free_flow_columns(some%body(1), 1.0_wp, x(:, 1), x(:, 2), x(:, 3), y(:, 0), y(:, 1), y(2:, 2), &
                                y(:, 3), stat(8))
         call free_flow_columns(some%body(2:), some%h, x(:, 1), x(:, 2), x(:, 3), stat=stat(9))
+        call free_flow(some%body, some%h(:1), m, q, stat(10))
+        call free_flow_columns(some%body(:1), some%h, x(:, 1), x(:, 2), x(:, 3), stat=stat(11))
         call t%ok('sizes-that-do-not-match-are-refused', all(stat == status_bad_count))
         call t%ok('and-left-alone', same(m, some%m) .and. same(q, some%q) .and. same(transpose(x), some%m))
     end subroutine check_counts

@@ -55,7 +55,7 @@ contains
         real(wp), intent(inout), contiguous :: m(:, :)
         integer, intent(out), optional :: stat
 
-        call rows(cores_of(body), h, size(body), m, stat)
+        call rows(cores_of(body), h, count_of(body, h), m, stat)
     end subroutine momenta_of_bodies_at_times
 
     !> The momenta and quaternions of n equal bodies, by the times h(n).
@@ -75,7 +75,7 @@ contains
         real(wp), intent(inout), contiguous :: m(:, :), q(:, :)
         integer, intent(out), optional :: stat
 
-        call rows(cores_of(body), h, size(body), m, stat, q)
+        call rows(cores_of(body), h, count_of(body, h), m, stat, q)
     end subroutine quaternions_of_bodies_at_times
 
     !> The momenta and matrices of n equal bodies, by h.
@@ -115,7 +115,7 @@ contains
         real(wp), intent(inout), contiguous :: m(:, :), a(:, :, :)
         integer, intent(out), optional :: stat
 
-        call matrices(cores_of(body), h, size(body), m, a, stat)
+        call matrices(cores_of(body), h, count_of(body, h), m, a, stat)
     end subroutine matrices_of_bodies_at_times
 
     !> The columns of n equal bodies, by h.
@@ -159,7 +159,7 @@ contains
         real(wp), intent(inout), contiguous, optional :: q0(:), q1(:), q2(:), q3(:)
         integer, intent(out), optional :: stat
 
-        call columns(cores_of(body), h, size(body), m1, m2, m3, stat, q0, q1, q2, q3)
+        call columns(cores_of(body), h, count_of(body, h), m1, m2, m3, stat, q0, q1, q2, q3)
     end subroutine columns_of_bodies_at_times
 
     !> n states in rows of m, and of q when present.
@@ -243,6 +243,15 @@ contains
         end if
         call conclude(code, 'free_flow_columns', stat)
     end subroutine columns
+
+    !> The number of bodies that have a time each; -1, which `match` refuses, if there are not as many times.
+    pure function count_of(body, h) result(n)
+        type(rigid_body), intent(in) :: body(:)
+        real(wp), intent(in) :: h(:)
+        integer :: n
+
+        n = merge(size(body), -1, size(body) == size(h))
+    end function count_of
 
     !> Whether there is one body or n, and one time or n.
     pure function match(core, h, n) result(yes)
