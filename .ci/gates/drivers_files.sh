@@ -68,11 +68,15 @@ input_is_not_overwritten() {
     for n in 0 1 2 3 4; do
         cp "data/init_example$n.dat" x
         ln -sf x soft; ln -f x hard; ln -sf ../x other/soft; ln -sf other/soft chain
-        for name in x ./x "$PWD/x" other/../x soft ./soft hard other/soft chain; do
+        for name in x ./x "$PWD/x" other/../x soft ./soft hard other/soft chain /proc/self/cwd/x; do
             refused cannot "$bin/driver_example$n" x -o "$name"
             refused cannot "$bin/driver_example$n" soft -o "$name"
             refused cannot "$bin/driver_example$n" - -o "$name" <x
             refused 'is the input, it cannot be the output too$' "$bin/driver_example$n" /dev/stdin -o "$name" <hard
+        done
+        # Standard output that is the input, at its end.
+        for name in - /dev/stdout; do
+            if "$bin/driver_example$n" x -o "$name" 2>/dev/null >>x; then return 1; fi
         done
         cmp x "data/init_example$n.dat"
         [ -L soft ]

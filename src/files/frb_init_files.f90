@@ -13,7 +13,6 @@
 module frb_init_files
     use frb_kinds, only: wp, most_points
     use frb_number_files, only: number_file
-    use frb_out_files, only: is_special
     use frb_rotations, only: cross
     implicit none
     private
@@ -78,9 +77,7 @@ contains
         call file%open_for_reading(path, error)
         if (allocated(error)) return
         if (present(output)) then
-            if (file%is_file(output) .and. .not. is_special(output)) then
-                error = file%path//': is the input, it cannot be the output too'
-            end if
+            if (file%is_file(output)) error = file%path//': is the input, it cannot be the output too'
         end if
         if (.not. allocated(error)) then
             call read_items(file, example, values, error)

@@ -12,6 +12,7 @@
 module frb_number_files
     use frb_kinds, only: wp
     use frb_number_words, only: is_blank, is_too_large, is_value, quoted, split_value
+    use frb_out_files, only: is_special
     use frb_system, only: without_links
     use, intrinsic :: iso_fortran_env, only: input_unit
     implicit none
@@ -94,19 +95,25 @@ contains
         if (io /= 0) error = self%path//': cannot be opened for reading'
     end subroutine open_for_reading
 
-    !> Whether a path leads to the file that is open here, by any name or link.
+    !> Whether a path leads to the file that is open here, by any name or link; not so for a device, such as a
+    !> terminal, that is read and written. '-' is standard output.
     function is_file(self, path) result(same)
         class(number_file), intent(in) :: self
         character(*), intent(in) :: path
         logical :: same
-        character(:), allocatable :: real_path
+        character(:), allocatable :: name, real_path, own_path
         integer :: unit, io
 
+        name = path
+        if (name == '-') name = '/dev/stdout'
+        real_path = without_links(name)
+        same = .false.
+        if (is_special(real_path)) return
         ! Most compilers find an open file by any of its names, some only by the name it was opened with.
-        inquire (file=path, number=unit, iostat=io)
+        inquire (file=name, number=unit, iostat=io)
         same = io == 0 .and. unit == self%unit
-        real_path = without_links(path)
-        if (.not. same .and. len(real_path) > 0) same = real_path == without_links(self%path)
+        own_path = without_links(self%path)
+        if (len(own_path) > 0) same = same .or. real_path == own_path
     end function is_file
 
     !> Goes back to the first number. With `by_lines` every item then starts on a new line, as if each were

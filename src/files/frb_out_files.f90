@@ -139,13 +139,14 @@ contains
         if (len(self%temporary) > 0) removed = c_remove(self%temporary//c_null_char) == 0
     end subroutine discard
 
-    !> Whether a path lies where the system keeps devices; /dev/shm/ holds ordinary files.
+    !> Whether a path lies where the system keeps devices and open files; /dev/shm/ holds ordinary files, and
+    !> so do folders that a process sees under /proc/, such as /proc/self/cwd/.
     pure function is_special(path) result(special)
         character(*), intent(in) :: path
         logical :: special
 
         special = index(path, '/dev/') == 1 .and. index(path, '/dev/shm/') /= 1
-        special = special .or. index(path, '/proc/') == 1
+        special = special .or. (index(path, '/proc/') == 1 .and. index(path, '/fd/') > 0)
     end function is_special
 
     ! ------------------------------------------------------------------------------------------ inner parts
@@ -192,7 +193,7 @@ contains
     end function full
 
     !> The path at the end of a chain of links, '' if the chain has more than 40 links. A new file takes the
-    !> place of the file there, and the links stay. Paths under /dev/ and /proc/ come back unchanged.
+    !> place of the file there, and the links stay. Paths of devices and of open files come back unchanged.
     function followed(path) result(name)
         character(*), intent(in) :: path
         character(:), allocatable :: name

@@ -24,9 +24,9 @@ contains
     !> q must have norm one, to 1e-6. For long runs call it again and again and keep what of the variations is
     !> wanted.
     !> Refused with `stat`, state and t untouched, the derivative 1: what `integrate` refuses at the start,
-    !> with its codes; what `flow_tangent` and the scene refuse later; a torque or its change that is not finite
-    !> (`status_bad_torque`); a scene without `torque_change` and a scheme with
-    !> modified kicks (`status_not_offered`).
+    !> with its codes; what `flow_tangent` and the scene refuse later; a torque or its change that is not
+    !> finite (`status_bad_torque`); a scene without `torque_change` and a scheme with modified kicks
+    !> (`status_not_offered`).
     subroutine integrate_tangent(body, scheme, scene, h, nsteps, m, q, transition, t, stat)
         type(rigid_body), intent(in) :: body
         type(splitting_scheme), intent(in) :: scheme
