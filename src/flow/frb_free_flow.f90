@@ -5,7 +5,8 @@
 !> State: m, angular momentum in the body; q or a, attitude, body to space. Any consistent units. Both are
 !> advanced in place by the time h, of any sign and size; steps that the series reach as m + increment and
 !> q + increment: N short steps gather rounding like a random walk, and the norms do not drift. A longer step
-!> multiplies q by a turn of norm one to rounding: where all turns are alike, an epsilon a step can add up. A
+!> multiplies q by a turn of norm one to rounding: where all turns are alike, an epsilon a step can add up,
+!> and for a body by its tensor also where they are not, in m too, as its axes are orthogonal to rounding. A
 !> quaternion keeps the norm it comes with, a matrix its defect of orthogonality, to that.
 !>
 !> Errors (`stat`): the status of a body that could not be made; `status_bad_momentum`, `status_bad_time`,
