@@ -3,6 +3,7 @@
 !> frb_flow_tangent_long.
 module frb_flow_tangent_body
     use frb_flow_limits, only: plain_largest, plain_smallest
+    use frb_flow_one, only: flow_body, turn_back
     use frb_flow_tangent_axis, only: follow_axis
     use frb_flow_tangent_inertia, only: inertia_columns, elements_in_axes
     use frb_flow_tangent_long, only: long_tangent
@@ -10,6 +11,7 @@ module frb_flow_tangent_body
     use frb_flow_tangent_parts, only: step_parts
     use frb_inertia, only: body_core, keep_off_axis
     use frb_kinds, only: wp
+    use frb_rotations, only: cross
     use frb_status, only: status_ok, status_bad_momentum, status_bad_attitude, status_bad_time
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
     implicit none
@@ -187,7 +189,7 @@ contains
         real(wp), intent(inout), optional :: jacobian(3, 3)
         real(wp), intent(inout), optional :: by_inertia(6, elements)
         type(body_core) :: principal
-        real(wp) :: n(3), old(3), change(4), w(3), w0
+        real(wp) :: n(3), old(3), change(4), c(3)
 
         call keep_off_axis(body, m, code)
         if (code /= status_ok) then
@@ -200,21 +202,16 @@ contains
         n = old
         if (.not. present(q)) then
             call tangent_body(principal, h, n, code, 0, jacobian=jacobian)
-            m = m + matmul(body%axes, n - old)
+            if (code == status_ok) call flow_body(body, h, m, code)
             jacobian = in_axes(body%axes, jacobian)
             if (body%linear) call drop_axis(body%axis, jacobian)
             return
         end if
         change = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
         call tangent_body(principal, h, n, code, elements, change, transition, by_inertia=by_inertia)
-        m = m + matmul(body%axes, n - old)
-        w = matmul(body%axes, change(2:4))
-        w0 = change(1) - 1
-        if (change(1) > 0.5_wp) w0 = -sum(w*w)/(1 + sqrt(1 - sum(w*w)))
-        q = q + [q(1)*w0 - (q(2)*w(1) + q(3)*w(2) + q(4)*w(3)), &
-                 q(1)*w(1) + q(2)*w0 + (q(3)*w(3) - q(4)*w(2)), &
-                 q(1)*w(2) + q(3)*w0 + (q(4)*w(1) - q(2)*w(3)), &
-                 q(1)*w(3) + q(4)*w0 + (q(2)*w(2) - q(3)*w(1))]
+        ! m is constant in space. n - old would lose what axes almost aligned mix in.
+        c = 2*cross(change(2:4), old)
+        if (code == status_ok) call turn_back(body, cross(change(2:4), c) - change(1)*c, change, m, q)
         transition(1:3, 1:3) = in_axes(body%axes, transition(1:3, 1:3))
         transition(4:6, 1:3) = matmul(body%axes, matmul(transition(4:6, 1:3), transpose(body%axes)))
         transition(4:6, 4:6) = in_axes(body%axes, transition(4:6, 4:6))
