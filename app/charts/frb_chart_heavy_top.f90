@@ -7,6 +7,7 @@ module frb_chart_heavy_top
     use frb_chart_solvers, only: solver, top_at_start, all_solvers, name_of, setting_of, run_solver, &
         settings_of_solver, start_q, one_top
     use frb_top_truth, only: qp, taylor_top
+    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
     implicit none
     private
 
@@ -59,7 +60,10 @@ contains
             do i = 1, size(solvers)
                 setting(k, i) = setting_of(solvers(i), top, k)
                 call run_solver(solvers(i), top, duration, setting(k, i), 1, m, q, seconds, torques(k, i))
-                errors(k, i) = max(1.0e-17_wp, real(2*min(norm2(q - q_end), norm2(q + q_end)), wp))
+                errors(k, i) = 10.0_wp      ! also where a solver has come to NaN
+                if (all(ieee_is_finite(q))) then
+                    errors(k, i) = max(1.0e-17_wp, real(2*min(norm2(q - q_end), norm2(q + q_end)), wp))
+                end if
                 rounds(i) = max(1, min(1000, int(enough/max(seconds, 1.0e-7_wp))))
             end do
             do r = 1, size(times, 1)
