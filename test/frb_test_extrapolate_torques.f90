@@ -40,8 +40,8 @@ module frb_test_extrapolate_torques
         procedure :: torque => noise
     end type noisy_torque
 
-    !> A force that turns with time.
-    type, extends(body_scene) :: turning_force
+    !> A force that turns with time. Its parent's torque in lanes must not take the place of its own.
+    type, extends(heavy_top) :: turning_force
     contains
         procedure :: torque => torque_of_turning_force
     end type turning_force
@@ -269,7 +269,7 @@ contains
         stat = status_ok
     end subroutine noise
 
-    subroutine torque_of_turning_force(self, q, t, tau, stat)
+    pure subroutine torque_of_turning_force(self, q, t, tau, stat)
         class(turning_force), intent(inout) :: self
         real(wp), intent(in) :: q(4), t
         real(wp), intent(out) :: tau(3)

@@ -13,6 +13,7 @@ module frb_test_tangent_runs
     use frb_status, only: status_bad_attitude, status_bad_count, status_bad_moments, status_bad_time, &
         status_bad_torque, status_not_offered
     use frb_tangent_cases, only: hat
+    use frb_torque_cases, only: spoilt_torque
     implicit none
     private
 
@@ -107,6 +108,7 @@ contains
         type(rigid_body) :: body
         type(free_motion) :: motion
         type(heavy_top) :: top
+        type(spoilt_torque) :: spoilt
         type(splitting_scheme) :: scheme
         real(wp) :: m0(3), q0(4), m(3), q(4), phi(6, 6), differences(6, 6), ends(7, 2), move(6), residual, &
             time, other_q(4)
@@ -157,8 +159,7 @@ contains
         time = huge(time)
         call integrate_tangent(body, scheme, top, 0.1_wp, 1, m, q, phi, time, code)
         call t%equal('run-from-a-time-beyond-all-limits', code, status_bad_time)
-        top%force = huge(1.0_wp)
-        call integrate_tangent(body, scheme, top, 0.1_wp, 1, m, q, phi, stat=code)
+        call integrate_tangent(body, scheme, spoilt, 0.1_wp, 1, m, q, phi, stat=code)
         call t%equal('run-under-a-torque-beyond-all-limits', code, status_bad_torque)
         motion = free_motion(body, m0, q0)
         call motion%tangent(7.0_wp, phi)

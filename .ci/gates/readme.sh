@@ -19,19 +19,43 @@ readme_commands_run() {
     done < <(readme_commands)
 }
 
-# The program of the README, its block marked fortran, prints the text block after it.
-readme_program_says_what_is_printed_below_it() {
-    mkdir -p build/readme/app
-    printf 'name = "readme"\n[dependencies]\nfrb.path = "../.."\n' >build/readme/fpm.toml
-    sed -n '/^```fortran$/,/^```$/{/^```/!p}' README.md >build/readme/app/main.f90
-    awk '/^```fortran$/ {seen = 1} seen && /^```text$/ {inside = 1; next} inside && /^```$/ {exit} inside' \
-        README.md >build/readme/expected
-    [ -s build/readme/expected ]
-    cd build/readme
-    "$fpm" build
-    "$fpm" run 2>log | grep -v '^Project is up to date' >output
-    cat log
-    diff expected output
+# Each program of the README, a block marked fortran, prints the text block after it.
+readme_programs_say_what_is_printed_below_them() {
+    local number
+    for number in $(seq "$(grep -cx '```fortran' README.md)"); do
+        mkdir -p "build/readme$number/app"
+        printf 'name = "readme"\n[dependencies]\nfrb.path = "../.."\n' >"build/readme$number/fpm.toml"
+        readme_block fortran "$number" >"build/readme$number/app/main.f90"
+        readme_block text "$number" >"build/readme$number/expected"
+        [ -s "build/readme$number/expected" ]
+        (cd "build/readme$number" && "$fpm" build && "$fpm" run >output && diff expected output)
+    done
+}
+
+# readme_block KIND NUMBER: the lines of one block of the README.
+readme_block() {
+    awk -v fence="\`\`\`$1" -v number="$2" '
+        inside && /^```$/ {inside = 0}
+        inside && count == number
+        $0 == fence {count++; inside = 1}' README.md
+}
+
+# A newcomer reads 1500 words.
+readme_is_short() {
+    [ "$(wc -w <README.md)" -le 1500 ]
+    [ "$(wc -l <README.md)" -le 150 ]
+}
+
+# Every link of every README of the tree, pictures among them, leads to a file.
+links_lead_somewhere() {
+    local page target missing=0
+    for page in $(find . -name build -prune -o -name '.venv*' -prune -o -name README.md -print); do
+        for target in $(grep -oE '\]\([^)]+\)' "$page" | sed 's/^](//; s/)$//; s/#.*//'); do
+            case $target in http* | '') continue ;; esac
+            [ -e "$(dirname "$page")/$target" ] || { printf '%s: %s\n' "$page" "$target"; missing=1; }
+        done
+    done
+    return $missing
 }
 
 # prints_its_comment SOURCE OUTPUT: the output is the closing comment of the source, blanks at the start of lines aside.

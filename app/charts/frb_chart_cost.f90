@@ -98,7 +98,7 @@ contains
 
         call open_script(options, 'cost', 900, 620, file)
         call file%put_lines([character(width) :: 'set logscale xy', 'set format x "10^{%T}"', &
-            'set xlabel "step size h {/Symbol w}  [rad]"', &
+            'set xlabel "step size h ω  [rad]"', &
             'set ylabel "time per step / cheapest discrete Moser-Veselov"', &
             'set key outside right center vertical spacing 1.15 samplen 2.2 Left reverse', &
             'set title "Cost of one step, its accuracy aside"', &

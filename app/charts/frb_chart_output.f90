@@ -126,6 +126,7 @@ contains
             height, ' font "Helvetica,12"'
         call file%put()
         call file%put('if (!exists("picture")) picture = "'//name//'".(exists("format") ? ".png" : ".svg")')
+        call file%put('set encoding utf8')
         call file%put('set output picture')
         do i = 1, size(palette)
             write (file%line, '(a,i0,a)') 'set linetype ', i, ' lc rgb '//trim(palette(i))// &

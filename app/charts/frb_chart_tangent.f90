@@ -267,7 +267,7 @@ contains
 
         call open_script(options, 'tangent', 1000, 1080, file)
         call file%put('set multiplot title "Largest error of '//either(options%quick, '1', '3')// &
-            ' random cases: J = dm''/dm (lines), W = d{/Symbol q}''/dm (dashed)"')
+            ' random cases: J = dm''/dm (lines), W = dθ''/dm (dashed)"')
         call file%put_lines([character(width) :: 'set logscale xy', 'set format y "10^{%T}"', &
             'set yrange [5e-3:1e19]', 'set ytics 1,1e4', 'set ytics add ("NaN" 1e18)', 'unset key', &
             'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0', 'set size 0.25,0.195'])

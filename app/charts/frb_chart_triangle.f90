@@ -132,7 +132,7 @@ contains
         real(wp) :: left
 
         call open_script(options, name, 1000, 560, file)
-        call file%put('set multiplot title "log_{10} of the error of one step h = 1, '//title//'"')
+        call file%put('set multiplot title "log10 of the error of one step h = 1, '//title//'"')
         call file%put_lines([character(width) :: &
             'set palette defined (0 "#fde725", 1 "#5ec962", 2 "#21918c", 3 "#3b528b", 4 "#440154")', &
             'set cbrange [-16.5:-13.5]', 'set xrange [0:1]', 'set yrange [0.5:1]', 'set xtics 0.25', &

@@ -12,11 +12,14 @@ module frb_flow_one
     use frb_kinds, only: wp
     use frb_status, only: status_ok, status_bad_momentum, status_bad_attitude, status_bad_time
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+    use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
     public :: flow_body, flow_one, turn_back
 
+    !> What flow_one is asked for within this module.
+    integer, parameter :: by_rescaling = 1, for_change = 2
     !> How far a step reaches: which series it takes.
     integer, parameter :: tiny_step = 1, short_step = 2, middle_step = 3
     real(wp), parameter :: largest_square_angle = 1.0e40_wp
@@ -42,19 +45,18 @@ contains
 
     !> Advances m, and q when present, by h. `body` has status_ok and its own axes are principal.
     !> code: status_ok, or why the input was refused (it is then untouched).
-    pure recursive subroutine flow_one(body, h, m, code, q, scaled, increment)
+    pure recursive subroutine flow_one(body, h, m, code, q, asked)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: h
         real(wp), intent(inout) :: m(3)
         integer, intent(out) :: code
         real(wp), intent(inout), optional :: q(4)
-        logical, intent(in), optional :: scaled     !! present: by flow_rescaled, which is not called again
-        real(wp), intent(inout), optional :: increment(3)   !! of m, not rounded to its digits; after a long
-                                                            !! step as it was
+        integer, intent(in), optional :: asked      !! by_rescaling: flow_rescaled is not called again;
+                                                    !! for_change: m comes back as its change
         real(wp) :: t, a, b, g, m1, m2, m3, gg, p, r, nu_first, nu_mirror, rate
         real(wp) :: y, scd, u, w, k, a23, b31, g12, d1, d2, d3
         real(wp) :: nu, v0, v1, v2, v3, angle, twist, cosm1, along, dot, square, change, w0, w1, w2, w3, q3
-        real(wp) :: size_m, size_q
+        integer(int64) :: smallest, largest
         integer :: i1, i2, i3, reach
         logical :: plain, first_form
 
@@ -67,24 +69,40 @@ contains
         t = 0.5_wp*h
         ! What is finite, not zero and far from overflow goes on; the rest is sorted out apart. No sum or
         ! product overflows on the way.
-        size_m = 0.25_wp*abs(m(1)) + (0.25_wp*abs(m(2)) + 0.25_wp*abs(m(3)))
-        size_q = size_m
-        if (present(q)) size_q = (abs(q(1)) + abs(q(2))) + (abs(q(3)) + abs(q(4)))
-        plain = are_plain(size_m, size_q, t, body%a(1))
+        smallest = max(magnitude(m(1)), magnitude(m(2)), magnitude(m(3)))
+        largest = max(smallest, magnitude(t), magnitude(body%a(1)))
+        if (present(q)) then
+            largest = max(largest, magnitude(q(1)), magnitude(q(2)), magnitude(q(3)), magnitude(q(4)))
+            smallest = min(smallest, max(magnitude(q(1)), magnitude(q(2)), magnitude(q(3)), magnitude(q(4))))
+        end if
+        plain = are_plain(smallest, largest)
+        if (plain) then
+            rate = body%a(1)*t
+            plain = abs(rate) < plain_largest
+        end if
         if (.not. plain) then
             code = status_bad_momentum
-            if (.not. present(scaled)) call flow_rescaled(body, h, m, code, q, increment)
+            if (present(asked)) then
+                if (asked == by_rescaling) return
+            end if
+            call flow_rescaled(body, h, m, code, q)
+            if (present(asked)) call leave_change(asked, [m1, m2, body%parity*m3], [i1, i2, i3], m)
             return
         end if
         code = status_ok
-        rate = body%a(1)*t
         square = rate*rate*(m1*m1 + m2*m2 + m3*m3)
         if (square > middle_turn_limit) then    ! long whatever the orbit: its constants are formed there
-            if (square <= largest_square_angle .or. present(scaled)) then
+            if (square <= largest_square_angle) then
                 call long_step(body, t, m, q)
             else
-                call flow_rescaled(body, h, m, code, q, increment)
+                if (present(asked)) then
+                    if (asked == by_rescaling) call long_step(body, t, m, q)
+                    if (asked == for_change) call flow_rescaled(body, h, m, code, q)
+                else
+                    call flow_rescaled(body, h, m, code, q)
+                end if
             end if
+            if (present(asked)) call leave_change(asked, [m1, m2, body%parity*m3], [i1, i2, i3], m)
             return
         end if
         call orbit_constants(body%alpha, body%beta, body%gamma, t, m1, m2, m3, a, b, g, gg, p, r, nu_first, &
@@ -97,6 +115,7 @@ contains
             reach = middle_step
         else
             call long_step(body, t, m, q)
+            if (present(asked)) call leave_change(asked, [m1, m2, body%parity*m3], [i1, i2, i3], m)
             return
         end if
         a23 = a*(m2*m3)
@@ -117,7 +136,9 @@ contains
         m(i1) = m1 + d1
         m(i2) = m2 + d2
         m(i3) = body%parity*(m3 + d3)
-        if (present(increment)) increment([i1, i2, i3]) = [d1, d2, body%parity*d3]
+        if (present(asked)) then
+            if (asked == for_change) m([i1, i2, i3]) = [d1, d2, body%parity*d3]
+        end if
         if (.not. present(q)) return
 
         ! Of the two mirror forms the one with the smaller parameter nu of the third kind.
@@ -168,6 +189,15 @@ contains
         q(1 + i3) = body%parity*q3
     end subroutine flow_one
 
+    !> The change of the momentum since `old`, in sorted axes, takes its place where that is asked for.
+    pure subroutine leave_change(asked, old, order, m)
+        integer, intent(in) :: asked, order(3)
+        real(wp), intent(in) :: old(3)
+        real(wp), intent(inout) :: m(3)
+
+        if (asked == for_change) m(order) = m(order) - old
+    end subroutine leave_change
+
     !> flow_one for a body whose own axes are not principal, and for a linear rotor, whose constants are those
     !> of a sphere and hold in any axes. Otherwise the momentum is taken to principal axes, and only
     !> the increments are taken back, so that no rounding of the rotation gathers over many steps.
@@ -177,7 +207,7 @@ contains
         real(wp), intent(inout) :: m(3)
         integer, intent(out) :: code
         real(wp), intent(inout), optional :: q(4)
-        real(wp) :: n(3), old(3), increment(3), upright(3), change(4), size_q
+        real(wp) :: change(3), upright(3), turn(4), size_q
 
         code = status_bad_momentum
         if (.not. all(ieee_is_finite(m))) return
@@ -199,23 +229,16 @@ contains
             if (code == status_ok) m = upright
             return
         end if
-        old = matmul(m, body%axes)
-        n = old
-        increment = 0.0_wp
+        ! The change of m, not rounded to the digits of m: where axes are all but aligned, what they mix in
+        ! would be rounded away in every step, and |m| would drift.
+        change = matmul(m, body%axes)
         if (present(q)) then
-            change = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-            call flow_one(body, h, n, code, change, increment=increment)
+            turn = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+            call flow_one(body, h, change, code, turn, for_change)
+            if (code == status_ok) call turn_back(body, change, turn, m, q)
         else
-            call flow_one(body, h, n, code, increment=increment)
-        end if
-        if (code /= status_ok) return
-        ! n - old has no digits below those of m: where the axes are all but aligned, what they mix in would
-        ! be rounded away in every step, and |m| would drift.
-        if (maxval(abs(increment)) <= 0.0_wp) increment = n - old
-        if (present(q)) then
-            call turn_back(body, increment, change, m, q)
-        else
-            m = m + matmul(body%axes, increment)
+            call flow_one(body, h, change, code, asked=for_change)
+            if (code == status_ok) m = m + matmul(body%axes, change)
         end if
     end subroutine flow_in_principal_axes
 
@@ -240,13 +263,12 @@ contains
 
     !> The same flow with momentum, moments and time scaled by powers of 2 to the middle of the exponents; a
     !> time so long that no digit of any phase is left is cut to where the arithmetic holds.
-    pure recursive subroutine flow_rescaled(body, h, m, code, q, increment)
+    pure recursive subroutine flow_rescaled(body, h, m, code, q)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: h
         real(wp), intent(inout) :: m(3)
         integer, intent(out) :: code
         real(wp), intent(inout), optional :: q(4)
-        real(wp), intent(inout), optional :: increment(3)
         integer, parameter :: cut = 64     ! angles of 2^64 and more have no phase
         type(body_core) :: scaled
         real(wp) :: largest, time
@@ -280,16 +302,31 @@ contains
         if (present(q)) then
             eq = exponent(maxval(abs(q)))
             q = scale(q, -eq)
-            call flow_one(scaled, time, m, code, q, .true., increment)
+            call flow_one(scaled, time, m, code, q, by_rescaling)
             q = scale(q, eq)
         else
-            call flow_one(scaled, time, m, code, scaled=.true., increment=increment)
+            call flow_one(scaled, time, m, code, asked=by_rescaling)
         end if
         m = scale(m, em)
-        if (present(increment)) increment = scale(increment, em)
     end subroutine flow_rescaled
 
-    include 'plain_numbers.inc'
+    !> The bits of a number without its sign, for which flang calls its run-time library: ordered as its size
+    !> is, with Inf and NaN above all. Comparing
+    !> them raises no exception, and keeps out of the way of the floating-point units.
+    elemental function magnitude(x) result(bits)
+        real(wp), intent(in) :: x
+        integer(int64) :: bits
+
+        bits = iand(transfer(x, 0_int64), huge(0_int64))
+    end function magnitude
+
+    !> Whether magnitudes from the smallest to the largest are those of plain numbers.
+    pure function are_plain(smallest, largest) result(plain)
+        integer(int64), intent(in) :: smallest, largest
+        logical :: plain
+
+        plain = largest < transfer(plain_largest, 0_int64) .and. smallest > transfer(plain_smallest, 0_int64)
+    end function are_plain
 
     include 'orbit_formulas.inc'
 

@@ -53,8 +53,8 @@ module frb_extrapolation
     !> error of m and q to the next step; it costs nothing. For many times along a run that has no observer
     !> call again with `t`.
     !>
-    !> The scene's `torque_lanes` is asked for four attitudes and times at once, 36 a step and one by
-    !> `torque`; by default that is `torque` four times, which takes a third longer on a heavy top.
+    !> The scene's `torque_lanes` is asked for eight attitudes and times at once, the last four the first
+    !> four again; 36 different ones a step and one by `torque`. By default that is `torque` four times.
     !>
     !> When to take what: see frb_splitting. This is not symplectic and not reversible: the energy drifts by
     !> the error of the steps, which can be held near rounding up to T = 1e5 or so.

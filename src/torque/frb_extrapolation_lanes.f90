@@ -6,11 +6,10 @@
 module frb_extrapolation_lanes
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
-    use frb_torque, only: lanes => scene_lanes
     implicit none
     private
 
-    public :: state_of_lanes, form_of_step, chosen_form, begin_sequences, kick_and_drift
+    public :: lanes, state_of_lanes, form_of_step, chosen_form, begin_sequences, kick_and_drift
 
     !> One of the two forms of the turn: axes of the body in the order of the formulas, the third one turned
     !> round if need be so that they are right-handed, and the constants of the body for them. The mirror form
@@ -20,6 +19,8 @@ module frb_extrapolation_lanes
         real(wp) :: sign3 = 1.0_wp
         real(wp) :: alpha = 0.0_wp, beta = 0.0_wp, gamma = 0.0_wp, a1 = 0.0_wp
     end type form_of_step
+
+    integer, parameter :: lanes = 4     !! sequences advanced at a time
 
     !> The lanes of a step that is tried; in the axes of the body but for m, which is in those of the form.
     type :: state_of_lanes

@@ -1,13 +1,13 @@
 !> One step of `extrapolate`: see frb_extrapolation.
 module frb_extrapolation_step
-    use frb_extrapolation_lanes, only: state_of_lanes, form_of_step, chosen_form, begin_sequences, &
+    use frb_extrapolation_lanes, only: lanes, state_of_lanes, form_of_step, chosen_form, begin_sequences, &
         kick_and_drift
     use frb_flow_one, only: flow_one
     use frb_inertia, only: body_core, keep_off_axis
     use frb_kinds, only: wp
     use frb_rotations, only: quat_conjugate, quat_product, quat_rotate
     use frb_status, only: status_ok, status_bad_torque
-    use frb_torque, only: body_scene, lanes => scene_lanes
+    use frb_torque, only: body_scene, scene_lanes
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
     use, intrinsic :: iso_fortran_env, only: int64
     implicit none
@@ -218,33 +218,40 @@ contains
 
     end subroutine try_step
 
-    !> The torques of the lanes, in principal axes; 0 where the scene refuses.
+    !> The torques of the lanes, in principal axes; 0 where the scene refuses. The scene is asked for
+    !> scene_lanes of them: those beyond `lanes` repeat the first ones.
     subroutine torque_of_lanes(self, scene, time, q, tau, code)
         type(extrapolated_body), intent(in) :: self
         class(body_scene), intent(inout) :: scene
         real(wp), intent(in) :: time(lanes), q(lanes, 4)
         real(wp), intent(inout) :: tau(lanes, 3)
         integer, intent(out) :: code
-        real(wp) :: q_body(lanes, 4), back(4), one(4)
+        real(wp) :: q_scene(scene_lanes, 4), time_scene(scene_lanes), tau_scene(scene_lanes, 3)
+        real(wp) :: back(4), one(4)
         integer :: l
 
         if (self%other_axes) then
             back = quat_conjugate(self%core%axes_q)
             do l = 1, lanes
                 one = q(l, :)
-                q_body(l, :) = quat_product(one, back)
+                q_scene(l, :) = quat_product(one, back)
             end do
-            call scene%torque_lanes(q_body, time, tau, code)
-            if (code == status_ok) then
-                do l = 1, lanes
-                    one(1:3) = tau(l, :)
-                    tau(l, :) = quat_rotate(back, one(1:3))
-                end do
-            end if
         else
-            call scene%torque_lanes(q, time, tau, code)
+            q_scene(:lanes, :) = q
         end if
-        if (code /= status_ok) tau = 0.0_wp
+        q_scene(lanes + 1:, :) = q_scene(:scene_lanes - lanes, :)
+        time_scene(:lanes) = time
+        time_scene(lanes + 1:) = time(:scene_lanes - lanes)
+        call scene%torque_lanes(q_scene, time_scene, tau_scene, code)
+        tau = 0.0_wp
+        if (code /= status_ok) return
+        tau = tau_scene(:lanes, :)
+        if (self%other_axes) then
+            do l = 1, lanes
+                one(1:3) = tau(l, :)
+                tau(l, :) = quat_rotate(back, one(1:3))
+            end do
+        end if
     end subroutine torque_of_lanes
 
     !> Kick and drift of the lanes by the free flow itself, for drifts of any length.

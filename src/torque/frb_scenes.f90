@@ -2,8 +2,8 @@
 module frb_scenes
     use frb_kinds, only: wp
     use frb_rotations, only: quat_rotate
-    use frb_status, only: status_ok, status_bad_torque
-    use frb_torque, only: body_scene, lanes => scene_lanes
+    use frb_status, only: status_ok, status_bad_torque, status_not_offered
+    use frb_torque, only: body_scene, lanes => scene_lanes, torque_lane_by_lane
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
     implicit none
     private
@@ -12,6 +12,9 @@ module frb_scenes
 
     !> A body with a fixed point under a constant force at one of its points: V = force . Q centre.
     !> The paper's heavy top (section 4.3) has force = u0 and centre = e3.
+    !>
+    !> In a type that extends this one, `torque_lanes` and `torque_change` ask the `torque` of that type, as
+    !> it may be another one: they are then those of body_scene, unless the type overrides them too.
     type, extends(body_scene) :: heavy_top
         real(wp) :: force(3) = [0.0_wp, 0.0_wp, 1.0_wp]     !! gradient of V, in space
         real(wp) :: centre(3) = [0.0_wp, 0.0_wp, 1.0_wp]    !! point it acts at, in the body
@@ -72,7 +75,7 @@ contains
     end subroutine heavy_top_torque
 
     !> The same in lanes.
-    pure subroutine heavy_top_torque_lanes(self, q, t, tau, stat)
+    subroutine heavy_top_torque_lanes(self, q, t, tau, stat)
         class(heavy_top), intent(inout) :: self
         real(wp), intent(in) :: q(lanes, 4), t(lanes)
         real(wp), intent(out) :: tau(lanes, 3)
@@ -80,17 +83,20 @@ contains
         real(wp) :: force(3), centre(3), u1, u2, u3
         integer :: l
 
-        associate (unused_t => t)
-        end associate
-        force = self%force
-        centre = self%centre
-        do l = 1, lanes
-            call force_in_body(force, q(l, 1), q(l, 2), q(l, 3), q(l, 4), u1, u2, u3)
-            tau(l, 1) = u2*centre(3) - u3*centre(2)
-            tau(l, 2) = u3*centre(1) - u1*centre(3)
-            tau(l, 3) = u1*centre(2) - u2*centre(1)
-        end do
-        stat = status_ok
+        select type (self)
+        type is (heavy_top)
+            force = self%force
+            centre = self%centre
+            do l = 1, lanes
+                call force_in_body(force, q(l, 1), q(l, 2), q(l, 3), q(l, 4), u1, u2, u3)
+                tau(l, 1) = u2*centre(3) - u3*centre(2)
+                tau(l, 2) = u3*centre(1) - u1*centre(3)
+                tau(l, 3) = u1*centre(2) - u2*centre(1)
+            end do
+            stat = status_ok
+        class default
+            call torque_lane_by_lane(self, q, t, tau, stat)
+        end select
     end subroutine heavy_top_torque_lanes
 
     !> As u changes by u x n: (u x n) x centre.
@@ -103,15 +109,21 @@ contains
 
         associate (unused_t => t)
         end associate
-        call force_in_body(self%force, q(1), q(2), q(3), q(4), u1, u2, u3)
-        ! Written out, as calls would take as long as all the rest.
-        w1 = u2*n(3) - u3*n(2)
-        w2 = u3*n(1) - u1*n(3)
-        w3 = u1*n(2) - u2*n(1)
-        change(1) = w2*self%centre(3) - w3*self%centre(2)
-        change(2) = w3*self%centre(1) - w1*self%centre(3)
-        change(3) = w1*self%centre(2) - w2*self%centre(1)
         stat = status_ok
+        select type (self)
+        type is (heavy_top)
+            call force_in_body(self%force, q(1), q(2), q(3), q(4), u1, u2, u3)
+            ! Written out, as calls would take as long as all the rest.
+            w1 = u2*n(3) - u3*n(2)
+            w2 = u3*n(1) - u1*n(3)
+            w3 = u1*n(2) - u2*n(1)
+            change(1) = w2*self%centre(3) - w3*self%centre(2)
+            change(2) = w3*self%centre(1) - w1*self%centre(3)
+            change(3) = w1*self%centre(2) - w2*self%centre(1)
+        class default
+            change = 0.0_wp
+            stat = status_not_offered
+        end select
     end subroutine heavy_top_torque_change
 
     !> u = Q^T f. Written out in short chains of operations: a call of quat_rotate would cost more than that.

@@ -60,12 +60,13 @@ contains
                 if (i > plan%stages .or. code /= status_ok) exit
                 call scene%torque(q_now, now + plan%time(i), tau, code)
                 m_now = m_now + plan%kick(i)*tau
+                if (code == status_ok .and. .not. all(ieee_is_finite(m_now))) code = status_bad_torque
                 do k = 1, 3
                     if (code == status_ok) call scene%torque_change(q_now, now + plan%time(i), axes(:, k), &
                                                                     change(:, k), code)
                 end do
-                if (code == status_ok .and. .not. (all(ieee_is_finite(m_now)) .and. &
-                                                   all(ieee_is_finite(change)))) code = status_bad_torque
+                if (code /= status_ok) exit
+                if (.not. all(ieee_is_finite(change))) code = status_bad_torque
                 if (code == status_ok) transition(1:3, :) = transition(1:3, :) &
                                                             + plan%kick(i)*matmul(change, transition(4:6, :))
             end do
