@@ -1,7 +1,7 @@
 !> Steps of one body beyond the series of frb_flow_one: s^2 by its series at a fraction of the time and
 !> doublings, many periods by the arithmetic-geometric mean.
 module frb_flow_long
-    use frb_flow_limits, only: middle_limit, square_limit, period_limit, &
+    use frb_flow_limits, only: most_halvings, middle_limit, square_limit, period_limit, &
         smallest_denominator, sin_cos_limit
     use frb_inertia, only: body_core
     use frb_kinds, only: wp, pi
@@ -46,17 +46,15 @@ contains
         turned = 1.0_wp
         many_periods = pmax > period_limit
         if (many_periods) call reduce_periods(pmax, delta, nu, with_attitude, fraction, turned, whole)
-        ! Down to a part of the time that the series reach, by as many halvings as there are doublings. These
-        ! loops end: flow_one lets no NaN and no Inf in, by their bits, also where comparisons are folded.
-        ! A count as a second bound would make a step of the momentum alone a tenth slower.
+        ! Down to a part of the time that the series reach, by as many halvings as there are doublings.
         span = fraction*fraction
         triples = 0
-        do while (pmax*span > square_limit)
+        do while (pmax*span > square_limit .and. triples < most_halvings)
             span = 0.25_wp*span
             triples = triples + 1
         end do
         squares = 0
-        do while (pmax*span > middle_limit)   ! nu <= pmax
+        do while (pmax*span > middle_limit .and. squares < most_halvings)   ! nu <= pmax
             span = 0.25_wp*span
             squares = squares + 1
         end do
