@@ -51,8 +51,8 @@ contains
         real(wp), intent(inout) :: m(3)
         integer, intent(out) :: code
         real(wp), intent(inout), optional :: q(4)
-        integer, intent(in), optional :: asked      !! by_rescaling: flow_rescaled is not called again;
-                                                    !! for_change: m comes back as its change
+        !> With by_rescaling, flow_rescaled is not called again; with for_change, m comes back as its change.
+        integer, intent(in), optional :: asked
         real(wp) :: t, a, b, g, m1, m2, m3, gg, p, r, nu_first, nu_mirror, rate
         real(wp) :: y, scd, u, w, k, a23, b31, g12, d1, d2, d3
         real(wp) :: nu, v0, v1, v2, v3, angle, twist, cosm1, along, dot, square, change, w0, w1, w2, w3, q3
