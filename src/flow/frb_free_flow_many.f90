@@ -123,7 +123,7 @@ contains
         type(rigid_body), intent(in) :: body
         real(wp), intent(in) :: h
         real(wp), intent(inout), contiguous :: m1(:), m2(:), m3(:)
-        real(wp), intent(inout), contiguous, optional :: q0(:), q1(:), q2(:), q3(:)
+        real(wp), intent(inout), optional :: q0(:), q1(:), q2(:), q3(:)
         integer, intent(out), optional :: stat
 
         call columns([core_of(body)], [h], size(m1), m1, m2, m3, stat, q0, q1, q2, q3)
@@ -134,7 +134,7 @@ contains
         type(rigid_body), intent(in) :: body
         real(wp), intent(in) :: h(:)
         real(wp), intent(inout), contiguous :: m1(:), m2(:), m3(:)
-        real(wp), intent(inout), contiguous, optional :: q0(:), q1(:), q2(:), q3(:)
+        real(wp), intent(inout), optional :: q0(:), q1(:), q2(:), q3(:)
         integer, intent(out), optional :: stat
 
         call columns([core_of(body)], h, size(h), m1, m2, m3, stat, q0, q1, q2, q3)
@@ -145,7 +145,7 @@ contains
         type(rigid_body), intent(in), target :: body(:)
         real(wp), intent(in) :: h
         real(wp), intent(inout), contiguous :: m1(:), m2(:), m3(:)
-        real(wp), intent(inout), contiguous, optional :: q0(:), q1(:), q2(:), q3(:)
+        real(wp), intent(inout), optional :: q0(:), q1(:), q2(:), q3(:)
         integer, intent(out), optional :: stat
 
         call columns(cores_of(body), [h], size(body), m1, m2, m3, stat, q0, q1, q2, q3)
@@ -156,7 +156,7 @@ contains
         type(rigid_body), intent(in), target :: body(:)
         real(wp), intent(in) :: h(:)
         real(wp), intent(inout), contiguous :: m1(:), m2(:), m3(:)
-        real(wp), intent(inout), contiguous, optional :: q0(:), q1(:), q2(:), q3(:)
+        real(wp), intent(inout), optional :: q0(:), q1(:), q2(:), q3(:)
         integer, intent(out), optional :: stat
 
         call columns(cores_of(body), h, count_of(body, h), m1, m2, m3, stat, q0, q1, q2, q3)
@@ -221,14 +221,15 @@ contains
         call conclude(code, 'free_flow', stat)
     end subroutine matrices
 
-    !> n states in columns.
+    !> n states in columns. The q are nowhere `contiguous`: GCC reads the address of such an argument, absent
+    !> or not, where it is passed on.
     subroutine columns(core, h, n, m1, m2, m3, stat, q0, q1, q2, q3)
         type(body_core), intent(in) :: core(:)
         real(wp), intent(in), contiguous :: h(:)
         integer, intent(in) :: n
         real(wp), intent(inout), contiguous :: m1(:), m2(:), m3(:)
         integer, intent(out), optional :: stat
-        real(wp), intent(inout), contiguous, optional :: q0(:), q1(:), q2(:), q3(:)
+        real(wp), intent(inout), optional :: q0(:), q1(:), q2(:), q3(:)
         integer :: code
 
         code = status_bad_count
