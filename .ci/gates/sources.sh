@@ -37,6 +37,9 @@ versions_agree() {
     for file in $(grep -rl --include='*.h' 'define FRB_VERSION ' src include 2>/dev/null); do
         grep -q "define FRB_VERSION \"$version\"" "$file" || { echo "$file: not $version"; return 1; }
     done
+    for file in $(grep -rlE --include=CMakeLists.txt '^ *find_package\(frb ' .); do
+        grep -q "find_package(frb ${version%.*} " "$file" || { echo "$file: not ${version%.*}"; return 1; }
+    done
     [ ! -e CITATION.cff ] || grep -q "^version: \"\?$version\"\?\$" CITATION.cff
     if grep -qi '^#.*change log' README.md; then
         [ "$(sed -n '/^#.*[Cc]hange log/,$p' README.md | grep -oE '[0-9]+\.[0-9]+\.[0-9]+' | head -n 1)" = "$version" ]
