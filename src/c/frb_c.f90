@@ -15,7 +15,7 @@ module frb_c
     implicit none
     private
 
-    public :: usable, triple, quadruple
+    public :: find_state, triple, quadruple
 
     !> Sizes of the opaque types of frb.h, in doubles; a motion has room to spare.
     integer, parameter :: body_doubles = 30, motion_doubles = 60
@@ -52,14 +52,11 @@ contains
         type(c_ptr), value :: moments, body
         integer(c_int) :: stat
         type(triple), pointer :: three
-        type(body_core), pointer :: core
 
         stat = status_bad_moments
-        if (.not. (c_associated(moments) .and. c_associated(body))) return
+        if (.not. c_associated(moments)) return
         call c_f_pointer(moments, three)
-        call c_f_pointer(body, core)
-        core = core_from_moments(three%x)
-        stat = core%status
+        call store_body(core_from_moments(three%x), body, stat)
     end function c_body_from_moments
 
     !> A body from its inertia tensor, which is symmetric: rows and columns may change places.
@@ -67,15 +64,25 @@ contains
         type(c_ptr), value :: tensor, body
         integer(c_int) :: stat
         type(matrix), pointer :: nine
-        type(body_core), pointer :: core
 
         stat = status_bad_tensor
-        if (.not. (c_associated(tensor) .and. c_associated(body))) return
+        if (.not. c_associated(tensor)) return
         call c_f_pointer(tensor, nine)
-        call c_f_pointer(body, core)
-        core = core_from_tensor(nine%x)
-        stat = core%status
+        call store_body(core_from_tensor(nine%x), body, stat)
     end function c_body_from_tensor
+
+    !> Puts a body into the caller's memory and tells its status; without memory `stat` stays.
+    subroutine store_body(made, body, stat)
+        type(body_core), intent(in) :: made
+        type(c_ptr), intent(in) :: body
+        integer(c_int), intent(inout) :: stat
+        type(body_core), pointer :: core
+
+        if (.not. c_associated(body)) return
+        call c_f_pointer(body, core)
+        core = made
+        stat = made%status
+    end subroutine store_body
 
     !> Moments of a body, and its principal axes when asked for.
     function c_body_axes(body, moments, axes) bind(c, name='frb_body_axes') result(stat)
@@ -207,7 +214,6 @@ contains
     function c_motion_start(body, m, q, motion) bind(c, name='frb_motion_start') result(stat)
         type(c_ptr), value :: body, m, q, motion
         integer(c_int) :: stat
-        type(body_core), pointer :: core
         type(rigid_body), pointer :: whole_body
         type(triple), pointer :: m3
         type(quadruple), pointer :: q4
@@ -217,17 +223,8 @@ contains
         if (.not. c_associated(motion)) return
         call c_f_pointer(motion, sealed)
         sealed%seal = 0
-        stat = status_bad_moments
-        if (.not. c_associated(body)) return
-        call c_f_pointer(body, core)
-        if (.not. usable(core)) return
-        stat = status_bad_momentum
-        if (.not. c_associated(m)) return
-        stat = status_bad_attitude
-        if (.not. c_associated(q)) return
-        call c_f_pointer(body, whole_body)
-        call c_f_pointer(m, m3)
-        call c_f_pointer(q, q4)
+        call find_state(body, m, q, whole_body, m3, q4, stat)
+        if (stat /= status_ok) return
         sealed%motion = free_motion(whole_body, m3%x, q4%x)
         sealed%seal = seal_of_motions
         stat = int(sealed%motion%status, c_int)
@@ -322,6 +319,31 @@ contains
 
         bytes = one*8*motion_doubles
     end function c_motion_bytes
+
+    !> The body, momentum and attitude that the caller's pointers lead to, or the status of the first that is
+    !> missing.
+    subroutine find_state(body, m, q, whole_body, m3, q4, stat)
+        type(c_ptr), intent(in) :: body, m, q
+        type(rigid_body), pointer, intent(out) :: whole_body
+        type(triple), pointer, intent(out) :: m3
+        type(quadruple), pointer, intent(out) :: q4
+        integer(c_int), intent(out) :: stat
+        type(body_core), pointer :: core
+
+        nullify (whole_body, m3, q4)
+        stat = status_bad_moments
+        if (.not. c_associated(body)) return
+        call c_f_pointer(body, core)
+        if (.not. usable(core)) return
+        call c_f_pointer(body, whole_body)
+        stat = status_bad_momentum
+        if (.not. c_associated(m)) return
+        call c_f_pointer(m, m3)
+        stat = status_bad_attitude
+        if (.not. c_associated(q)) return
+        call c_f_pointer(q, q4)
+        stat = status_ok
+    end subroutine find_state
 
     !> Whether memory holds a body, made or refused: what C never set has no order of the axes.
     pure function usable(core) result(yes)

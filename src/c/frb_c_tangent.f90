@@ -1,9 +1,8 @@
 !> The C interface to the derivative of the exact step, described in frb.h.
 module frb_c_tangent
-    use frb_c, only: quadruple, triple, usable
+    use frb_c, only: find_state, quadruple, triple
     use frb_free_flow, only: flow_tangent, rigid_body
-    use frb_inertia, only: body_core
-    use frb_status, only: status_bad_moments, status_bad_momentum, status_bad_attitude, status_bad_count
+    use frb_status, only: status_ok, status_bad_count
     use, intrinsic :: iso_c_binding, only: c_associated, c_double, c_f_pointer, c_int, c_ptr
     implicit none
     private
@@ -19,7 +18,6 @@ contains
         type(c_ptr), value :: body, m, q, transition, by_moments
         real(c_double), value :: h
         integer(c_int) :: stat
-        type(body_core), pointer :: core
         type(rigid_body), pointer :: whole_body
         type(triple), pointer :: m3
         type(quadruple), pointer :: q4
@@ -27,19 +25,10 @@ contains
         real(c_double) :: by_state(columns, columns), by_inertia(columns, 3)
         integer :: code
 
-        stat = status_bad_moments
-        if (.not. c_associated(body)) return
-        call c_f_pointer(body, core)
-        if (.not. usable(core)) return
-        stat = status_bad_momentum
-        if (.not. c_associated(m)) return
-        stat = status_bad_attitude
-        if (.not. c_associated(q)) return
+        call find_state(body, m, q, whole_body, m3, q4, stat)
+        if (stat /= status_ok) return
         stat = status_bad_count
         if (.not. c_associated(transition)) return
-        call c_f_pointer(body, whole_body)
-        call c_f_pointer(m, m3)
-        call c_f_pointer(q, q4)
         if (c_associated(by_moments)) then
             call flow_tangent(whole_body, h, m3%x, q4%x, by_state, by_inertia, code)
             call c_f_pointer(by_moments, rows, [3, columns])

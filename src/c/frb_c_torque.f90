@@ -1,14 +1,12 @@
 !> The C interface to runs under torque, described in frb.h: a heavy top, and a torque given as a C function.
 module frb_c_torque
-    use frb_c, only: quadruple, triple, usable
+    use frb_c, only: find_state, quadruple, triple
     use frb_free_flow, only: rigid_body
-    use frb_inertia, only: body_core
     use frb_kinds, only: wp
     use frb_scenes, only: heavy_top
     use frb_schemes, only: splitting_scheme
     use frb_splitting, only: integrate
-    use frb_status, only: status_bad_moments, status_bad_momentum, status_bad_attitude, &
-        status_bad_option, status_bad_torque
+    use frb_status, only: status_ok, status_bad_option, status_bad_torque
     use frb_torque, only: body_scene
     use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_f_procpointer, &
         c_funptr, c_int, c_int64_t, c_null_char, c_ptr
@@ -99,7 +97,6 @@ contains
         real(c_double), intent(in) :: h
         integer(c_int64_t), intent(in) :: steps
         integer(c_int), intent(out) :: stat
-        type(body_core), pointer :: core
         type(rigid_body), pointer :: whole_body
         type(triple), pointer :: m3
         type(quadruple), pointer :: q4
@@ -107,19 +104,10 @@ contains
         real(c_double), target :: no_time
         integer :: code
 
-        stat = status_bad_moments
-        if (.not. c_associated(body)) return
-        call c_f_pointer(body, core)
-        if (.not. usable(core)) return
+        call find_state(body, m, q, whole_body, m3, q4, stat)
+        if (stat /= status_ok) return
         stat = status_bad_option
         if (.not. c_associated(scheme)) return
-        stat = status_bad_momentum
-        if (.not. c_associated(m)) return
-        stat = status_bad_attitude
-        if (.not. c_associated(q)) return
-        call c_f_pointer(body, whole_body)
-        call c_f_pointer(m, m3)
-        call c_f_pointer(q, q4)
         no_time = 0.0_c_double
         time => no_time
         if (c_associated(t)) call c_f_pointer(t, time)
