@@ -7,16 +7,23 @@ module frb_claims
     private
 
     public :: flow_median, flow_largest, kept_long
+    public :: tangent_median, tangent_rods, tangent_largest
     public :: matrix_median, matrix_largest, frame_median, frame_largest, orthogonal
     public :: chain_norms, chain_space
     public :: rf_error, rc_error, rj_error, k_error, f_error, am_error, pi_error
     public :: nodes_error, weight_error, far_weight_error
     public :: top_energy, compensated_energy, reversed
 
-    ! The free flow: scores in units of the inherent sensitivity; norms and energy after a million steps.
+    ! The free flow: scores in units of the inherent sensitivity; norms and energy after 1e6 and 1e7 steps.
     real(wp), parameter :: flow_median = 0.5_wp
     real(wp), parameter :: flow_largest = 2.0_wp
     real(wp), parameter :: kept_long = 1.0e-12_wp
+
+    ! Derivatives of the free flow: scores in units of the inherent sensitivity; rods have a median of
+    ! their own, as their angles about m are thousands of those across it.
+    real(wp), parameter :: tangent_median = 0.5_wp
+    real(wp), parameter :: tangent_rods = 0.6_wp
+    real(wp), parameter :: tangent_largest = 4.0_wp
 
     ! The paper's steps: scores of momentum and matrix, of quaternions in each frame; one attitude; chains.
     real(wp), parameter :: matrix_median = 1.0_wp

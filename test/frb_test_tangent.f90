@@ -2,6 +2,7 @@
 !> with and without its attitude, by its moments, bodies by a tensor.
 module frb_test_tangent
     use frb_checks, only: tally, largest, worst_of
+    use frb_claims, only: tangent_median, tangent_rods, tangent_largest
     use frb_flow_samples, only: no_turn, settled
     use frb_free_flow, only: flow_tangent, rigid_body
     use frb_kinds, only: wp
@@ -13,9 +14,6 @@ module frb_test_tangent
 
     public :: test_tangent
 
-    !> The bars, in units of the inherent sensitivity; medians of rods, whose angles about m are thousands of
-    !> those across it.
-    real(wp), parameter :: largest_median = 0.5_wp, median_of_rods = 0.6_wp, largest_score = 4.0_wp
     !> J, W, dm' and dtheta' by the inertia, J of the momentum alone.
     integer, parameter :: kinds = 5
     character(*), parameter :: names(kinds) = [character(12) :: 'J', 'W', 'm-by-I', 'theta-by-I', 'J-alone']
@@ -60,12 +58,12 @@ contains
             if (any(cases(:i - 1)%group == cases(i)%group)) cycle
             groups = groups + 1
             here = cases%group == cases(i)%group
-            bar = merge(median_of_rods, largest_median, any(cases(i)%group == [character(9) :: 'elongated', &
+            bar = merge(tangent_rods, tangent_median, any(cases(i)%group == [character(9) :: 'elongated', &
                                                                                'rod']))
             do k = 1, kinds
                 associate (name => trim(names(k))//': '//trim(cases(i)%group)//label)
                     if (medians) call t%at_most('median-of-'//name, median(pack(score(:, k), here)), bar)
-                    call t%at_most('score-of-'//name, largest(pack(score(:, k), here)), largest_score)
+                    call t%at_most('score-of-'//name, largest(pack(score(:, k), here)), tangent_largest)
                 end associate
             end do
         end do
@@ -114,10 +112,10 @@ contains
         end do
         call ieee_set_halting_mode(ieee_overflow, halting)
         worst = [largest(score(:, 1)), largest(score(:, 2))]
-        call t%at_most('median-of-J-in-lanes'//label, median(score(:, 1)), largest_median)
-        call t%at_most('median-of-W-in-lanes'//label, median(score(:, 2)), largest_median)
-        call t%at_most('score-of-J-in-lanes'//label, worst(1), largest_score)
-        call t%at_most('score-of-W-in-lanes'//label, worst(2), largest_score)
+        call t%at_most('median-of-J-in-lanes'//label, median(score(:, 1)), tangent_median)
+        call t%at_most('median-of-W-in-lanes'//label, median(score(:, 2)), tangent_median)
+        call t%at_most('score-of-J-in-lanes'//label, worst(1), tangent_largest)
+        call t%at_most('score-of-W-in-lanes'//label, worst(2), tangent_largest)
         call t%at_most('E-and-attitude-in-lanes-are-those-of-one-body'//label, apart, 1.0e-9_wp)
         call t%at_most('neighbours-change-no-digit'//label, moved, 0.0_wp)
     end subroutine check_lanes
