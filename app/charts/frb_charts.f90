@@ -8,6 +8,7 @@ program frb_charts
     use frb_chart_orbits, only: chart_orbits, chart_racket
     use frb_chart_output, only: settings, give_up, say
     use frb_chart_precision, only: chart_work_precision, chart_growth
+    use frb_chart_ratios, only: chart_ratios
     use frb_chart_scale, only: chart_scale
     use frb_chart_scenes, only: chart_scenes
     use frb_chart_tangent, only: chart_tangent
@@ -20,8 +21,8 @@ program frb_charts
     implicit none
 
     character(*), parameter :: names(*) = [character(16) :: 'speed', 'scenes', 'cost', 'work-precision', &
-        'heavy-top', 'torque', 'failure', 'growth', 'triangle', 'scale', 'water', 'orbits', 'tangent', &
-        'agreement']
+        'heavy-top', 'ratios', 'torque', 'failure', 'growth', 'triangle', 'scale', 'water', 'orbits', &
+        'tangent', 'agreement']
     type(settings) :: options
     character(:), allocatable :: argument
     logical :: wanted(size(names))
@@ -76,6 +77,8 @@ program frb_charts
             call chart_work_precision(options)
         case ('heavy-top')
             call chart_heavy_top(options)
+        case ('ratios')
+            call chart_ratios(options)
         case ('torque')
             call chart_torque(options)
         case ('failure')
@@ -122,6 +125,7 @@ contains
         call say('  cost            time per step against step size, all methods')
         call say('  work-precision  error at t = 10 against time spent, three bodies')
         call say('  heavy-top       the same with torque, against time and torques; energy over long runs')
+        call say('  ratios          table: heavy tops to an error, ratios of time')
         call say('  torque          tables: cost of the splitting loop, the long run, runs there and back')
         call say('  failure         error against closeness to every place where methods fail')
         call say('  growth          error against the number of steps for the same time')

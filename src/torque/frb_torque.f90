@@ -125,40 +125,56 @@ contains
 
     !> The torques at several attitudes and times, for `extrapolate`: a scene that computes them in a loop
     !> over the lanes, which the compiler turns into vectors, saves what single calls cost. By default these;
-    !> a lane that repeats the lane four before it is not asked for again.
+    !> lanes 5 to 8 are not asked for where they are 1 to 4 again.
     subroutine torque_lane_by_lane(self, q, t, tau, stat)
         class(body_scene), intent(inout) :: self
         real(wp), intent(in) :: q(scene_lanes, 4)         !! attitudes: a column for each component
         real(wp), intent(in) :: t(scene_lanes)            !! their times
         real(wp), intent(out) :: tau(scene_lanes, 3)      !! torques, body frame
         integer, intent(out) :: stat                !! `status_ok`, or a code that ends the run
-        integer, parameter :: repeats = 4
+        integer, parameter :: half = scene_lanes/2
         real(wp) :: attitude(4), one(3)
-        integer :: l, earlier, code
+        integer :: l, e, last, code
 
         stat = status_ok
-        do l = 1, scene_lanes
-            earlier = max(l - repeats, 1)
-            if (l > repeats) then
-                if (all(same_bits([t(l), q(l, :)], [t(earlier), q(earlier, :)]))) then
-                    tau(l, :) = tau(earlier, :)
-                    cycle
-                end if
-            end if
+        last = scene_lanes
+        if (second_half_repeats(q, t)) last = half
+        do l = 1, last
             attitude = q(l, :)
             call self%torque(attitude, t(l), one, code)
-            tau(l, :) = one
+            do e = 1, 3
+                tau(l, e) = one(e)
+            end do
             if (stat == status_ok) stat = code
         end do
+        if (last == half) tau(half + 1:, :) = tau(:half, :)
     end subroutine torque_lane_by_lane
 
-    !> Whether two numbers are the same to the bit, NaN too.
-    elemental function same_bits(x, y) result(same)
-        real(wp), intent(in) :: x, y
-        logical :: same
+    !> Whether lanes 5 to 8 are 1 to 4 again, to the bit, NaN too.
+    pure function second_half_repeats(q, t) result(repeats)
+        real(wp), intent(in) :: q(scene_lanes, 4), t(scene_lanes)
+        logical :: repeats
+        integer, parameter :: half = scene_lanes/2
+        integer(int64) :: differences(half)
+        integer :: l
 
-        same = transfer(x, 0_int64) == transfer(y, 0_int64)
-    end function same_bits
+        do l = 1, half
+            differences(l) = ior(ior(ior(difference(q(l, 1), q(half + l, 1)), &
+                                         difference(q(l, 2), q(half + l, 2))), &
+                                     ior(difference(q(l, 3), q(half + l, 3)), &
+                                         difference(q(l, 4), q(half + l, 4)))), &
+                                 difference(t(l), t(half + l)))
+        end do
+        repeats = ior(ior(differences(1), differences(2)), ior(differences(3), differences(4))) == 0
+    end function second_half_repeats
+
+    !> Bits in which two numbers differ.
+    pure function difference(x, y) result(bits)
+        real(wp), intent(in) :: x, y
+        integer(int64) :: bits
+
+        bits = ieor(transfer(x, 0_int64), transfer(y, 0_int64))
+    end function difference
 
     !> How the torque changes as the body turns: change = d/de tau(q exp(e n), t) at e = 0, body frame, for
     !> schemes with a modified kick (frb_modified_kicks); stat, `status_ok` or a code that ends the run. By
