@@ -1,7 +1,7 @@
 !> Schemes whose kicks take the change of the torque along: orders seen with the scene's own change and with
 !> displaced torques, one body and many, bodies by tensor, plans, long runs, refusals.
 module frb_test_modified_kicks
-    use frb_checks, only: tally, worst_of
+    use frb_checks, only: largest, tally, worst_of
     use frb_free_flow, only: free_flow, rigid_body
     use frb_invariants, only: total_energy
     use frb_kinds, only: wp
@@ -11,7 +11,7 @@ module frb_test_modified_kicks
     use frb_splitting, only: integrate
     use frb_splitting_plan, only: splitting_plan
     use frb_status, only: status_ok, status_bad_option, status_bad_scheme, status_bad_torque
-    use frb_torque, only: body_scene
+    use frb_torque, only: body_scene, one_after_the_other
     use frb_torque_cases, only: top_case, known_top, distance, recorder, dipoles, fitted_change
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
     implicit none
@@ -44,8 +44,9 @@ contains
     subroutine test_modified_kicks(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('modified-kicks', 43)
+        call t%open_suite('modified-kicks', 45)
         call test_change(t)
+        call test_both(t)
         call test_orders(t)
         call test_other_axes(t)
         call test_group(t)
@@ -74,6 +75,28 @@ contains
         call top%torque(quat_product(q, quat_conjugate(turn)), 0.0_wp, back, stat)
         call t%close_to('the-change-is-that-of-the-torque', change, (forth - back)/(2*small), 1.0e-9_wp)
     end subroutine test_change
+
+    !> Torque and g by one call against one after the other, a body in any axes; of an heir of the heavy top
+    !> its own torque.
+    subroutine test_both(t)
+        type(tally), intent(inout) :: t
+        real(wp), parameter :: response(3, 3) = reshape([1.4_wp, 0.2_wp, -0.3_wp, 0.2_wp, 0.9_wp, 0.1_wp, &
+                                                         -0.3_wp, 0.1_wp, 1.1_wp], [3, 3])
+        type(heavy_top) :: top
+        type(turning_top) :: heir
+        real(wp) :: q(4), tau(3), g(3), tau_alone(3), g_alone(3)
+        integer :: stat
+
+        top = heavy_top(force=[0.3_wp, -0.7_wp, 1.1_wp], centre=[0.5_wp, 0.9_wp, -0.4_wp])
+        q = [0.1_wp, 0.7_wp, 0.5_wp, 0.5_wp]
+        call top%torque_and_gradient(q, 0.0_wp, response, tau, g, stat)
+        call one_after_the_other(top, q, 0.0_wp, response, tau_alone, g_alone, stat)
+        call t%at_most('torque-and-g-at-once', largest([abs(tau - tau_alone), abs(g - g_alone)]), 16*eps)
+        heir%heavy_top = top
+        call heir%torque_and_gradient(q, 0.7_wp, response, tau, g, stat)
+        call one_after_the_other(heir, q, 0.7_wp, response, tau_alone, g_alone, stat)
+        call t%at_most('an-heir-gives-its-own', largest([abs(tau - tau_alone), abs(g - g_alone)]), 0.0_wp)
+    end subroutine test_both
 
     !> The order seen on the Hairer-Vilmart tops, between numbers of steps whose errors are two decades apart.
     subroutine test_orders(t)

@@ -3,7 +3,7 @@ module frb_scenes
     use frb_kinds, only: wp
     use frb_rotations, only: quat_rotate
     use frb_status, only: status_ok, status_bad_torque, status_not_offered
-    use frb_torque, only: body_scene, lanes => scene_lanes, torque_lane_by_lane
+    use frb_torque, only: body_scene, lanes => scene_lanes, torque_lane_by_lane, one_after_the_other
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
     implicit none
     private
@@ -13,14 +13,16 @@ module frb_scenes
     !> A body with a fixed point under a constant force at one of its points: V = force . Q centre.
     !> The paper's heavy top (section 4.3) has force = u0 and centre = e3.
     !>
-    !> In a type that extends this one, `torque_lanes` and `torque_change` ask the `torque` of that type, as
-    !> it may be another one: they are then those of body_scene, unless the type overrides them too.
+    !> In a type that extends this one, `torque_lanes`, `torque_change` and `torque_and_gradient` ask the
+    !> `torque` of that type, as it may be another one: they are then those of body_scene, unless the type
+    !> overrides them too.
     type, extends(body_scene) :: heavy_top
         real(wp) :: force(3) = [0.0_wp, 0.0_wp, 1.0_wp]     !! gradient of V, in space
         real(wp) :: centre(3) = [0.0_wp, 0.0_wp, 1.0_wp]    !! point it acts at, in the body
     contains
         procedure :: torque => heavy_top_torque    !! u x centre
         procedure :: torque_change => heavy_top_torque_change    !! its derivative along a turn
+        procedure :: torque_and_gradient => heavy_top_torque_and_gradient    !! both for modified kicks
         procedure :: torque_lanes => heavy_top_torque_lanes    !! the torque in lanes
         procedure :: potential => heavy_top_potential    !! force . Q centre
     end type heavy_top
@@ -68,9 +70,7 @@ contains
         associate (unused_t => t)
         end associate
         call force_in_body(self%force, q(1), q(2), q(3), q(4), u1, u2, u3)
-        tau(1) = u2*self%centre(3) - u3*self%centre(2)
-        tau(2) = u3*self%centre(1) - u1*self%centre(3)
-        tau(3) = u1*self%centre(2) - u2*self%centre(1)
+        call cross_product(u1, u2, u3, self%centre(1), self%centre(2), self%centre(3), tau(1), tau(2), tau(3))
         stat = status_ok
     end subroutine heavy_top_torque
 
@@ -89,9 +89,8 @@ contains
             centre = self%centre
             do l = 1, lanes
                 call force_in_body(force, q(l, 1), q(l, 2), q(l, 3), q(l, 4), u1, u2, u3)
-                tau(l, 1) = u2*centre(3) - u3*centre(2)
-                tau(l, 2) = u3*centre(1) - u1*centre(3)
-                tau(l, 3) = u1*centre(2) - u2*centre(1)
+                call cross_product(u1, u2, u3, centre(1), centre(2), centre(3), &
+                                   tau(l, 1), tau(l, 2), tau(l, 3))
             end do
             stat = status_ok
         class default
@@ -113,18 +112,59 @@ contains
         select type (self)
         type is (heavy_top)
             call force_in_body(self%force, q(1), q(2), q(3), q(4), u1, u2, u3)
-            ! Written out, as calls would take as long as all the rest.
-            w1 = u2*n(3) - u3*n(2)
-            w2 = u3*n(1) - u1*n(3)
-            w3 = u1*n(2) - u2*n(1)
-            change(1) = w2*self%centre(3) - w3*self%centre(2)
-            change(2) = w3*self%centre(1) - w1*self%centre(3)
-            change(3) = w1*self%centre(2) - w2*self%centre(1)
+            call cross_product(u1, u2, u3, n(1), n(2), n(3), w1, w2, w3)
+            call cross_product(w1, w2, w3, self%centre(1), self%centre(2), self%centre(3), &
+                               change(1), change(2), change(3))
         class default
             change = 0.0_wp
             stat = status_not_offered
         end select
     end subroutine heavy_top_torque_change
+
+    !> tau = u x c and g = 2 (D_n tau + n x tau) = 2 u x (n x c), c the centre. n x c = (I^-1 (u x c)) x c is
+    !> linear in u: its matrix does not wait for u.
+    subroutine heavy_top_torque_and_gradient(self, q, t, response, tau, g, stat)
+        class(heavy_top), intent(inout) :: self
+        real(wp), intent(in) :: q(4), t, response(3, 3)
+        real(wp), intent(out) :: tau(3), g(3)
+        integer, intent(out) :: stat
+        real(wp) :: u1, u2, u3, c1, c2, c3, w1, w2, w3, r(3, 3)
+        integer :: i
+
+        select type (self)
+        type is (heavy_top)
+            c1 = self%centre(1)
+            c2 = self%centre(2)
+            c3 = self%centre(3)
+            do i = 1, 3
+                ! n_i = R_i . (u x c) = (c x R_i) . u, R_i a row of the response.
+                call cross_product(c1, c2, c3, response(i, 1), response(i, 2), response(i, 3), &
+                                   r(i, 1), r(i, 2), r(i, 3))
+            end do
+            call force_in_body(self%force, q(1), q(2), q(3), q(4), u1, u2, u3)
+            call cross_product(u1, u2, u3, c1, c2, c3, tau(1), tau(2), tau(3))
+            w1 = (r(2, 1)*c3 - r(3, 1)*c2)*u1 + (r(2, 2)*c3 - r(3, 2)*c2)*u2 &
+                 + (r(2, 3)*c3 - r(3, 3)*c2)*u3
+            w2 = (r(3, 1)*c1 - r(1, 1)*c3)*u1 + (r(3, 2)*c1 - r(1, 2)*c3)*u2 &
+                 + (r(3, 3)*c1 - r(1, 3)*c3)*u3
+            w3 = (r(1, 1)*c2 - r(2, 1)*c1)*u1 + (r(1, 2)*c2 - r(2, 2)*c1)*u2 &
+                 + (r(1, 3)*c2 - r(2, 3)*c1)*u3
+            call cross_product(2*u1, 2*u2, 2*u3, w1, w2, w3, g(1), g(2), g(3))
+            stat = status_ok
+        class default
+            call one_after_the_other(self, q, t, response, tau, g, stat)
+        end select
+    end subroutine heavy_top_torque_and_gradient
+
+    !> c = a x b, number by number: inlined, as a call would take as long as all the rest.
+    pure subroutine cross_product(a1, a2, a3, b1, b2, b3, c1, c2, c3)
+        real(wp), intent(in) :: a1, a2, a3, b1, b2, b3
+        real(wp), intent(out) :: c1, c2, c3
+
+        c1 = a2*b3 - a3*b2
+        c2 = a3*b1 - a1*b3
+        c3 = a1*b2 - a2*b1
+    end subroutine cross_product
 
     !> u = Q^T f. Written out in short chains of operations: a call of quat_rotate would cost more than that.
     !> w = 2 f x q, u = f + q0 w + w x q.

@@ -155,13 +155,17 @@ contains
         to = from
     end subroutine copy
 
-    !> The torques g of a modified kick, as for one body: all bodies turn at a time.
-    subroutine ask_gradient(run, time, kick, modified, code)
+    !> The torques, and the torques g of a modified kick, as for one body: all bodies turn at a time.
+    subroutine ask_torque_and_gradient(run, time, kick, modified, code)
         type(moving), intent(inout) :: run
         real(wp), intent(in) :: time, kick, modified
-        integer, intent(out) :: code
+        integer, intent(inout) :: code
         integer :: i, refused
 
+        call ask_torque(run, time, refused)
+        if (code == status_ok) code = refused
+        call run%scene%agree(code)
+        if (code /= status_ok) return
         do i = 1, size(run%tau, 2)
             run%n(:, i) = angular_response(run%core(min(i, size(run%core))), run%tau(:, i))
         end do
@@ -182,7 +186,17 @@ contains
             if (code == status_ok) code = refused
             if (code == status_ok) run%g(:, :) = (run%g - run%other)/(2*run%basis%reach)
         end if
-        if (code /= status_ok) return
+        if (code == status_ok) call finish_gradient(run, code)
+        call run%scene%agree(code)
+    end subroutine ask_torque_and_gradient
+
+    !> g from the change of the torque, or the torque from one displaced, and whether all are finite and their
+    !> kicks do not overflow.
+    subroutine finish_gradient(run, code)
+        type(moving), intent(inout) :: run
+        integer, intent(inout) :: code
+        integer :: i
+
         do i = 1, size(run%tau, 2)
             if (run%basis%displaced == 1) then
                 run%tau(:, i) = run%other(:, i) + cross(run%n(:, i), run%tau(:, i))
@@ -193,7 +207,7 @@ contains
         end do
         if (.not. (all_within(size(run%tau), run%tau, run%basis%largest_torque) &
                    .and. all_within(size(run%g), run%g, run%basis%largest_gradient))) code = status_bad_torque
-    end subroutine ask_gradient
+    end subroutine finish_gradient
 
     !> The attitudes turned by `reach` times n.
     pure subroutine turn_all(run, reach)

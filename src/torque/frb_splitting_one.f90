@@ -5,7 +5,7 @@ module frb_splitting_one
     use frb_free_flow, only: core_of, rigid_body
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
-    use frb_modified_kicks, only: angular_response, turned
+    use frb_modified_kicks, only: angular_response, gradient_torque, turned
     use frb_rotations, only: cross, is_unit_quat
     use frb_schemes, only: splitting_scheme
     use frb_splitting_plan, only: splitting_plan, run_basis, new_basis, check_run, next_time
@@ -28,6 +28,7 @@ module frb_splitting_one
         real(wp) :: q_rest(4) = 0.0_wp
         real(wp) :: tau(3) = 0.0_wp
         real(wp) :: g(3) = 0.0_wp               ! see frb_modified_kicks
+        real(wp) :: response(3, 3) = 0.0_wp     ! I^-1 in the body frame
         real(wp) :: kept(14) = 0.0_wp
         type(body_core) :: core
         type(rigid_body), pointer :: body => null()
@@ -79,6 +80,7 @@ contains
             end if
             run%body => body
             run%core = core_of(body)
+            run%response = inverse_inertia(run%core)
             run%scene => scene
             if (present(observer)) run%observer => observer
             if (present(drift)) run%drift => drift
@@ -128,49 +130,65 @@ contains
         end if
     end subroutine kick
 
-    !> The torque g of a modified kick, from the scene's own change of the torque or from displaced torques.
-    !> One displaced torque takes the place of the torque itself, and g is then 0.
-    subroutine ask_gradient(run, time, kick, modified, code)
+    !> The torque, and the torque g of a modified kick, from the scene's own change of the torque or from
+    !> displaced torques, for which a second agreement is needed. All torques are asked for, whatever `code`
+    !> said before: others may take part in them. One displaced torque takes the place of the torque itself,
+    !> and g is then 0.
+    subroutine ask_torque_and_gradient(run, time, kick, modified, code)
         type(moving), intent(inout) :: run
         real(wp), intent(in) :: time, kick, modified
-        integer, intent(out) :: code
-        real(wp) :: n(3), change(3), other(3), turn(3)
+        integer, intent(inout) :: code
+        real(wp) :: change(3), other(3), turn(3)
         integer :: refused
 
-        if (run%core%needs_rotation) then
-            n = angular_response(run%core, run%tau)
-        else
-            n(run%core%order(1)) = run%core%a(1)*run%tau(run%core%order(1))
-            n(run%core%order(2)) = run%core%a(2)*run%tau(run%core%order(2))
-            n(run%core%order(3)) = run%core%a(3)*run%tau(run%core%order(3))
-        end if
         if (run%basis%displaced == 0) then
-            call run%scene%torque_change(run%q, time, n, change, code)
-            if (code == status_not_offered) run%basis%displaced = run%basis%on_request
+            call run%scene%torque_and_gradient(run%q, time, run%response, run%tau, run%g, refused)
+            if (refused == status_not_offered) then
+                run%basis%displaced = run%basis%on_request
+                refused = status_ok
+            end if
+        else
+            call run%scene%torque(run%q, time, run%tau, refused)
         end if
+        if (code == status_ok) code = refused
+        call check_torque_and_gradient(run, code)
+        if (run%basis%displaced == 0 .or. code /= status_ok) return
+        turn = matmul(run%response, run%tau)
         if (run%basis%displaced == 1) then
-            turn = (2*(modified/kick))*n
+            turn = (2*(modified/kick))*turn
             call run%scene%torque(turned(run%q, turn), time, change, code)
-        else if (run%basis%displaced == 2) then
-            ! Both, whatever the first one says: others may take part in the torques.
-            call run%scene%torque(turned(run%q, run%basis%reach*n), time, change, code)
-            call run%scene%torque(turned(run%q, -run%basis%reach*n), time, other, refused)
-            if (code == status_ok) code = refused
-            if (code == status_ok) change = (change - other)/(2*run%basis%reach)
-        end if
-        if (code /= status_ok) return
-        if (run%basis%displaced == 1) then
             run%tau = change + cross(turn, run%tau)
             run%g = 0.0_wp
         else
-            ! As frb_modified_kicks says; a call takes longer than that.
-            run%g(1) = 2*(change(1) + (n(2)*run%tau(3) - n(3)*run%tau(2)))
-            run%g(2) = 2*(change(2) + (n(3)*run%tau(1) - n(1)*run%tau(3)))
-            run%g(3) = 2*(change(3) + (n(1)*run%tau(2) - n(2)*run%tau(1)))
+            call run%scene%torque(turned(run%q, run%basis%reach*turn), time, change, code)
+            call run%scene%torque(turned(run%q, -run%basis%reach*turn), time, other, refused)
+            if (code == status_ok) code = refused
+            run%g = gradient_torque(turn, run%tau, (change - other)/(2*run%basis%reach))
         end if
-        if (.not. (all_within(3, run%tau, run%basis%largest_torque) &
-                   .and. all_within(3, run%g, run%basis%largest_gradient))) code = status_bad_torque
-    end subroutine ask_gradient
+        call check_torque_and_gradient(run, code)
+    end subroutine ask_torque_and_gradient
+
+    !> Whether torque and g are finite and their kicks do not overflow, agreed on.
+    subroutine check_torque_and_gradient(run, code)
+        type(moving), intent(inout) :: run
+        integer, intent(inout) :: code
+
+        if (code == status_ok) then
+            if (.not. (all_within(3, run%tau, run%basis%largest_torque) &
+                       .and. all_within(3, run%g, run%basis%largest_gradient))) code = status_bad_torque
+        end if
+        call run%scene%agree(code)
+    end subroutine check_torque_and_gradient
+
+    !> I^-1 in the body frame, as angular_response.
+    pure function inverse_inertia(core) result(response)
+        type(body_core), intent(in) :: core
+        real(wp) :: response(3, 3)
+
+        response(:, 1) = angular_response(core, [1.0_wp, 0.0_wp, 0.0_wp])
+        response(:, 2) = angular_response(core, [0.0_wp, 1.0_wp, 0.0_wp])
+        response(:, 3) = angular_response(core, [0.0_wp, 0.0_wp, 1.0_wp])
+    end function inverse_inertia
 
     !> The free body for a time h.
     subroutine advance(run, h, code)

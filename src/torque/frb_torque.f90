@@ -10,6 +10,7 @@
 module frb_torque
     use frb_free_flow, only: rigid_body
     use frb_kinds, only: wp
+    use frb_modified_kicks, only: gradient_torque
     use frb_status, only: status_ok, status_not_offered
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
     use, intrinsic :: iso_fortran_env, only: int64
@@ -17,7 +18,7 @@ module frb_torque
     private
 
     public :: body_scene, group_scene, body_observer, group_observer, body_drift, scene_lanes, &
-        torque_lane_by_lane
+        torque_lane_by_lane, one_after_the_other
 
     integer, parameter :: scene_lanes = 8     !! attitudes at a time that `torque_lanes` is asked for
 
@@ -27,6 +28,7 @@ module frb_torque
     contains
         procedure(torque_on_body), deferred :: torque    !! the torque
         procedure :: torque_change => body_change_unknown    !! its derivative, for modified kicks
+        procedure :: torque_and_gradient => one_after_the_other    !! torque and g of a modified kick at once
         procedure :: torque_lanes => torque_lane_by_lane    !! the torque in lanes, for `extrapolate`
         procedure :: potential => body_potential_unknown    !! the potential, where there is one
         procedure :: agree => body_alone    !! hook of runs on many processes
@@ -192,7 +194,25 @@ contains
         stat = status_not_offered
     end subroutine body_change_unknown
 
-    !> The same for a group, all bodies turning at a time: n and change are (3, n).
+    !> The torque and g = 2 (D_n tau + n x tau), n = I^-1 tau, of a modified kick (frb_modified_kicks) for a
+    !> scene that shares work between them; response is I^-1 in the body frame. By default from `torque` and
+    !> `torque_change`. stat: `status_not_offered` where there is no `torque_change`; tau is there then.
+    subroutine one_after_the_other(self, q, t, response, tau, g, stat)
+        class(body_scene), intent(inout) :: self
+        real(wp), intent(in) :: q(4), t, response(3, 3)
+        real(wp), intent(out) :: tau(3), g(3)
+        integer, intent(out) :: stat
+        real(wp) :: n(3), change(3)
+
+        g = 0.0_wp
+        call self%torque(q, t, tau, stat)
+        if (stat /= status_ok) return
+        n = matmul(response, tau)
+        call self%torque_change(q, t, n, change, stat)
+        if (stat == status_ok) g = gradient_torque(n, tau, change)
+    end subroutine one_after_the_other
+
+    !> `torque_change` for a group, all bodies turning at a time: n and change are (3, n).
     subroutine group_change_unknown(self, q, t, n, change, stat)
         class(group_scene), intent(inout) :: self
         real(wp), contiguous, intent(in) :: q(:, :)
