@@ -1,7 +1,9 @@
-!> The methods the charts compare with: each reaches its order, the truth its digits. All in quadruple
-!> precision, from the texts the chart program compiles in double precision.
+!> The methods the charts compare with: each reaches its order, the truth its digits. From the texts that the
+!> chart program compiles in double precision, here in quadruple precision, but those by a frame.
 module frb_test_rivals
-    use frb_checks, only: tally, largest
+    use frb_checks, only: tally, largest, worst_of
+    use frb_double_frames, only: frame_steps
+    use frb_free_flow, only: free_flow, rigid_body
     use frb_kinds, only: wp, has_quad
     use frb_quad_dmv, only: rk, dmv_body, new_dmv_body, dmv_steps
     use frb_quad_rotations, only: rotation_steps
@@ -27,12 +29,46 @@ contains
     subroutine test_rivals(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('rivals', 25)
+        call t%open_suite('rivals', 30)
         if (t%provided(has_quad, 6, 'truth, which needs 30 digits')) call check_truth(t)
         if (t%provided(has_quad, 5, 'truth of tops, which needs 30 digits')) call check_top(t)
         if (t%provided(has_quad, 14, 'orders, which need 30 digits')) call check_orders(t)
+        call check_frames(t)
         call t%close_suite()
     end subroutine test_rivals
+
+    !> The motion by a frame, with momenta round the axis of the least and of the largest moment, against the
+    !> free flow: by theta functions to rounding, by Hermite quadrature to its order.
+    subroutine check_frames(t)
+        type(tally), intent(inout) :: t
+        real(wp), parameter :: body(3) = [1.0_wp, 1.5_wp, 2.0_wp], time = 3.0_wp
+        real(wp), parameter :: starts(3, 4) = reshape([0.5_wp, 0.6_wp, 0.7_wp, 0.9_wp, -0.3_wp, 0.2_wp, &
+                                                       -0.9_wp, 0.1_wp, -0.3_wp, 0.1_wp, -0.5_wp, -0.9_wp], &
+                                                      [3, 4])
+        integer, parameter :: steps(2) = [16, 64]
+        real(wp) :: m(3), q(4), m_end(3), q_end(4), worst, error(2)
+        integer :: i, k
+
+        worst = 0.0_wp
+        do i = 1, size(starts, 2)
+            m_end = starts(:, i)
+            q_end = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+            call free_flow(rigid_body(body), time, m_end, q_end)
+            m = starts(:, i)
+            q = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+            call frame_steps(body, .true., time, 1, m, q)
+            worst = worst_of(worst, largest([norm2(m - m_end), min(norm2(q - q_end), norm2(q + q_end))]))
+            do k = 1, 2
+                m = starts(:, i)
+                q = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+                call frame_steps(body, .false., time/steps(k), steps(k), m, q)
+                error(k) = min(norm2(q - q_end), norm2(q + q_end))
+            end do
+            call t%close_to('hermite-quadrature-has-order-4', log(error(1)/error(2))/log(4.0_wp), 4.0_wp, &
+                            real(tolerance_order, wp))
+        end do
+        call t%at_most('theta-functions-are-exact', worst, 1.0e-14_wp)
+    end subroutine check_frames
 
     !> End values of 30 digits at t = 10 (Hairer and Vilmart's two bodies) and t = 100 (tennis racket).
     subroutine check_truth(t)

@@ -91,8 +91,9 @@ contains
         type(settings), intent(in) :: options
         type(method), intent(in) :: methods(:)
         character(*), parameter :: shown(*) = [character(12) :: 'flow', 'flow-batch', 'flow-m', 'flow-a', &
-            'quat_step', 'frb_step', 'quat_step-2', 'frb_step-2', 'dmv2', 'dmv6', 'dmv10', 'rotations2', &
-            'rotations4', 'rk4', 'dp-6', 'dp-12']
+            'quat_step', 'frb_step', 'quat_step-2', 'frb_step-2', 'theta', &
+            'hermite', 'dmv2', 'dmv6', 'dmv10', &
+            'rotations2', 'rotations4', 'rk4', 'dp-6', 'dp-12']
         type(chart_file) :: file
         integer :: i, j
 

@@ -2,7 +2,7 @@
 !> place where methods are known to fail, one panel each.
 module frb_chart_failure
     use frb, only: wp
-    use frb_chart_methods, only: method, catalogue, style, family_momentum, family_dp
+    use frb_chart_methods, only: method, catalogue, style, family_momentum, family_dp, family_frames
     use frb_chart_output, only: chart_file, width, settings, open_table, open_script, draw, progress, &
         quantile, say, either, &
         uniform, random_direction
@@ -98,7 +98,7 @@ contains
         allocate (methods, source=catalogue())
         allocate (keep(size(methods)))
         do i = 1, size(methods)
-            keep(i) = methods(i)%family /= family_momentum
+            keep(i) = all(methods(i)%family /= [family_momentum, family_frames])
             if (methods(i)%family == family_dp) keep(i) = methods(i)%key == 'dp-15' &
                 .or. methods(i)%key == 'dp-9'
         end do

@@ -2,6 +2,7 @@
 module frb_chart_methods
     use frb, only: wp, rigid_body, free_flow, frb_step, quat_step, status_ok, quat_to_matrix, matrix_to_quat
     use frb_dmv, only: dmv_body, new_dmv_body, dmv_steps
+    use frb_momentum_frames, only: frame_steps
     use frb_rotation_splitting, only: rotation_steps
     use frb_runge_kutta, only: rk4_steps, dormand_prince
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
@@ -12,7 +13,7 @@ module frb_chart_methods
     public :: method, catalogue, find_method, known, style, escaped, advance, advance_once, constants, &
         new_constants
     public :: family_flow, family_batch, family_momentum, family_matrix, family_paper_q, family_paper_a
-    public :: family_dmv, family_rotations, family_rk4, family_dp
+    public :: family_dmv, family_rotations, family_rk4, family_dp, family_frames
 
     integer, parameter :: family_flow = 1           !! free flow, quaternion, one body
     integer, parameter :: family_batch = 2          !! free flow, quaternion, many bodies in one call
@@ -24,6 +25,7 @@ module frb_chart_methods
     integer, parameter :: family_rotations = 8      !! option: order
     integer, parameter :: family_rk4 = 9
     integer, parameter :: family_dp = 10            !! adaptive; tolerance
+    integer, parameter :: family_frames = 11        !! option: 1 theta functions, 2 Hermite quadrature
 
     type :: method
         character(12) :: key = ''       !! name in the tables
@@ -85,6 +87,8 @@ contains
             call add('frb_step-'//digits, 'frb_step, np = '//digits, family_paper_a, 0, gauss(i), 5, 3, &
                 i + 1, 2)
         end do
+        call add('theta', 'theta functions', family_frames, 1, 0, 6, 3, 9, 2)
+        call add('hermite', 'Hermite quadrature', family_frames, 2, 0, 6, 4, 13, 2)
         do i = 2, 10, 2
             write (digits, '(i0)') i
             call add('dmv'//digits, 'Moser-Veselov '//digits, family_dmv, i, 0, &
@@ -114,7 +118,7 @@ contains
             item%option = option
             item%points = points
             if (present(tolerance)) item%tolerance = tolerance
-            item%exact = family <= family_paper_a .and. points == 0
+            item%exact = (family <= family_paper_a .and. points == 0) .or. key == 'theta'
             item%colour = colour
             item%dash = dash
             item%symbol = symbol
@@ -274,6 +278,8 @@ contains
             call dmv_steps(ready%rival, with%option, h, nsteps, m, q)
         case (family_rotations)
             call rotation_steps(moments, with%option, h, nsteps, m, q)
+        case (family_frames)
+            call frame_steps(moments, with%option == 1, h, nsteps, m, q)
         case (family_rk4)
             call rk4_steps(moments, h, nsteps, m, q)
         case (family_dp)

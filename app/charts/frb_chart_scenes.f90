@@ -3,7 +3,7 @@
 module frb_chart_scenes
     use frb, only: wp
     use frb_chart_methods, only: method, catalogue, family_batch, family_momentum, family_dp, &
-        family_dmv, family_flow
+        family_dmv, family_flow, family_frames
     use frb_chart_output, only: chart_file, settings, open_table, quantile, say
     use frb_chart_timing, only: workload, new_workload, time_in_turn
     use frb_chart_truth, only: free_case, new_case, errors_of
@@ -103,6 +103,7 @@ contains
         item = new_case(what%moments, what%m0, what%t)
         do i = 1, size(methods)
             if (methods(i)%family == family_momentum .and. .not. what%momentum_only) cycle
+            if (methods(i)%family == family_frames) cycle
             if (what%bodies > 1 .and. all(methods(i)%family /= [family_batch, family_flow, family_dmv])) cycle
             if (what%bodies == 1 .and. methods(i)%family == family_batch) cycle
             if (methods(i)%family == family_dp .and. what%steps > 0) cycle
