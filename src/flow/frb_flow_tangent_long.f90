@@ -99,22 +99,6 @@ contains
         end if
     end subroutine long_tangent
 
-    !> The product of a column and a row added to a matrix.
-    pure subroutine add_product(u1, u2, u3, v1, v2, v3, x11, x12, x13, x21, x22, x23, x31, x32, x33)
-        real(wp), intent(in) :: u1, u2, u3, v1, v2, v3
-        real(wp), intent(inout) :: x11, x12, x13, x21, x22, x23, x31, x32, x33
-
-        x11 = x11 + u1*v1
-        x12 = x12 + u1*v2
-        x13 = x13 + u1*v3
-        x21 = x21 + u2*v1
-        x22 = x22 + u2*v2
-        x23 = x23 + u2*v3
-        x31 = x31 + u3*v1
-        x32 = x32 + u3*v2
-        x33 = x33 + u3*v3
-    end subroutine add_product
-
     !> The constants of the motion in the form with the smaller nu, and the part of the half step that is left
     !> when whole periods are taken out.
     pure subroutine set_orbit(body, t, m, f, it)
@@ -317,11 +301,15 @@ contains
 
     include 'tangent_formulas.inc'
 
+    include 'tangent_turn_formulas.inc'
+
     include 'tangent_middle_formulas.inc'
 
     include 'tangent_long_formulas.inc'
 
     include 'tangent_phase_formulas.inc'
+
+    include 'tangent_product_formulas.inc'
 
     include 'tangent_storage.inc'
 

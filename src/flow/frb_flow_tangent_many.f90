@@ -1,14 +1,16 @@
 !> Many equal bodies with the derivatives of their step: blocks of them through SIMD lanes, blocks through
 !> threads.
 module frb_flow_tangent_many
-    use frb_flow_limits, only: plain_largest, plain_smallest
+    use frb_flow_limits, only: plain_largest, middle_limit, period_limit
     use frb_flow_tangent_body, only: tangent_body
-    use frb_flow_tangent_lanes, only: lanes, tangent_lanes, step_lanes, is_served
+    use frb_flow_tangent_far, only: find_far_ends
+    use frb_flow_tangent_lanes, only: lanes, lane_body, lane_orbits, lane_ends, load_lanes, set_forms, &
+        is_served, keep_lanes, join_lanes, finish_lanes
+    use frb_flow_tangent_near, only: find_near_ends
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
     use frb_status, only: status_ok
-    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_is_nan
-    use, intrinsic :: iso_fortran_env, only: int64
+    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
     implicit none
     private
 
@@ -26,22 +28,21 @@ contains
         real(wp), intent(inout) :: m(3, n), q(4, n)
         real(wp), intent(out) :: transition(6, 6, n)
         integer, intent(out) :: code
-        type(tangent_lanes) :: block
+        type(lane_body) :: of
         logical :: in_lanes, served(lanes)
-        integer :: first, i, one, refused
+        integer :: first, i, count, one, refused
 
         refused = status_ok
         in_lanes = body%status == status_ok .and. .not. body%needs_rotation .and. is_plain_time(body, h)
-        block%transition = 0.0_wp
-        !$omp parallel do if (n >= 64*lanes) firstprivate(block) private(served, i, one) &
-        !$omp& reduction(max: refused)
+        of = body_of_lanes(body, 0.5_wp*h)
+        !$omp parallel do if (n >= 64*lanes) private(served, i, count, one) reduction(max: refused)
         do first = 1, n, lanes
+            count = min(lanes, n - first + 1)
             served = .false.
-            if (in_lanes .and. first + lanes - 1 <= n) then
-                call step_block(body, h, m(1, first), q(1, first), transition(1, 1, first), block, served)
-            end if
-            if (all(served)) cycle
-            do i = first, min(first + lanes - 1, n)
+            if (in_lanes .and. count > lanes/4) call step_block(of, count, m(1, first), q(1, first), &
+                                                               transition(1, 1, first), served)
+            if (all(served(:count))) cycle
+            do i = first, first + count - 1
                 if (served(i - first + 1)) cycle
                 call tangent_body(body, h, m(:, i), one, 0, q(:, i), transition(:, :, i))
                 refused = max(refused, one)
@@ -51,139 +52,96 @@ contains
         code = refused
     end subroutine tangent_many
 
-    !> Advances those of a whole block that the lanes serve; the others are left as they are.
-    subroutine step_block(body, h, m, q, transition, block, served)
+    !> The body over the half step t, its axes in cyclic order.
+    pure function body_of_lanes(body, t) result(of)
         type(body_core), intent(in) :: body
-        real(wp), intent(in) :: h
-        real(wp), intent(inout) :: m(3, lanes), q(4, lanes), transition(36, lanes)
-        type(tangent_lanes), intent(inout) :: block
-        logical, intent(out) :: served(lanes)
-        integer :: l, i
+        real(wp), intent(in) :: t
+        type(lane_body) :: of
 
-        served = .false.
-        do i = 1, 3
-            do l = 1, lanes
-                block%m(l, i) = m(body%order(i), l)
-                block%q(l, i) = q(1 + body%order(i), l)
-            end do
-        end do
-        do l = 1, lanes
-            block%q(l, 0) = q(1, l)
-        end do
-        if (.not. all_plain(block)) return
-        if (body%parity < 0.0_wp) call reflect(block)
-        call step_lanes(body%alpha, body%beta, body%gamma, body%a(1), body%a(3), 0.5_wp*h, block)
-        if (body%parity < 0.0_wp) call reflect(block)
-        served = is_served(block%reach, block%square)
-        if (all(served)) then
-            call store(body%order, block, m, q, transition)
+        if (body%parity > 0.0_wp) then
+            of = lane_body(body%order, body%alpha*t, body%beta*t, body%gamma*t, body%a(1)*t, body%a(3)*t, &
+                           (body%a(1)*t)**2)
         else
-            call store_some(body%order, block, served, m, q, transition)
+            of = lane_body(body%order(3:1:-1), -body%gamma*t, -body%beta*t, -body%alpha*t, body%a(3)*t, &
+                           body%a(1)*t, (body%a(1)*t)**2)
         end if
+    end function body_of_lanes
+
+    !> Advances those of a block that the lanes serve; the others are left as they are.
+    subroutine step_block(of, count, m, q, transition, served)
+        type(lane_body), intent(in) :: of
+        integer, intent(in) :: count
+        real(wp), intent(inout) :: m(3, count), q(4, count), transition(36, count)
+        logical, intent(out) :: served(lanes)
+        type(lane_orbits) :: orbits
+        real(wp) :: some_m(3, lanes), some_q(4, lanes), some(36, lanes)
+        integer :: l, near, far
+
+        associate (o => of%order)
+            if (count == lanes) then
+                call load_lanes(of, m(o(1), 1), m(o(2), 1), m(o(3), 1), q, orbits, near, far)
+                if (near + far == lanes) then
+                    call step_lanes(of, near, far, orbits, m, q, transition)
+                    served = .true.
+                    return
+                end if
+            end if
+            do l = 1, lanes
+                some_m(:, l) = m(:, min(l, count))
+                some_q(:, l) = q(:, min(l, count))
+            end do
+            call load_lanes(of, some_m(o(1), 1), some_m(o(2), 1), some_m(o(3), 1), some_q, orbits, near, far)
+        end associate
+        served = is_served(orbits%reach)
+        if (near + far == 0) return
+        do l = 1, lanes
+            if (.not. served(l)) some_q(:, l) = 1.0_wp
+        end do
+        call step_lanes(of, near, far, orbits, some_m, some_q, some)
+        do l = 1, count
+            if (.not. served(l)) cycle
+            m(:, l) = some_m(:, l)
+            q(:, l) = some_q(:, l)
+            transition(:, l) = some(:, l)
+        end do
     end subroutine step_block
 
-    !> A block back to the bodies, its axes in the order of theirs.
-    pure subroutine store(order, block, m, q, transition)
-        integer, intent(in) :: order(3)
-        type(tangent_lanes), intent(in) :: block
+    !> Advances a whole block, of which `near` lanes are served by series and `far` by doublings.
+    subroutine step_lanes(of, near, far, orbits, m, q, transition)
+        type(lane_body), intent(in) :: of
+        integer, intent(in) :: near, far
+        type(lane_orbits), intent(inout) :: orbits
         real(wp), intent(inout) :: m(3, lanes), q(4, lanes), transition(36, lanes)
-        real(wp) :: sorted(lanes, 36)
-        integer :: l, i, k, from, place
+        type(lane_orbits) :: some
+        type(lane_ends) :: ends, near_ends, far_ends
 
-        do i = 1, 3
-            do l = 1, lanes
-                m(order(i), l) = block%m(l, i)
-                q(1 + order(i), l) = block%q(l, i)
-            end do
-        end do
-        do l = 1, lanes
-            q(1, l) = block%q(l, 0)
-        end do
-        if (all(order == [1, 2, 3])) then
-            call transpose_into(block%transition, transition)
-            return
+        call set_forms(of, orbits)
+        if (far == 0) then
+            call find_near_ends(of%b, orbits, ends)
+        else if (near == 0) then
+            call find_far_ends(of%b, orbits, ends)
+        else
+            call keep_lanes(-1.0_wp, middle_limit, orbits, some)
+            call find_near_ends(of%b, some, near_ends)
+            call keep_lanes(middle_limit, period_limit, orbits, some)
+            call find_far_ends(of%b, some, far_ends)
+            call join_lanes(orbits%reach, near_ends, far_ends, ends)
         end if
-        sorted = 0.0_wp
-        do k = 1, 3
-            do i = 1, 3
-                from = i + 6*(k - 1)
-                place = order(i) + 6*(order(k) - 1)
-                sorted(:, place) = block%transition(:, from)
-                sorted(:, place + 3) = block%transition(:, from + 3)
-                sorted(:, place + 21) = block%transition(:, from + 21)
+        call clear(transition)
+        call finish_lanes(of, orbits, ends, m, q, transition)
+    end subroutine step_lanes
+
+    !> The zeros of [J 0; W E], and of E what is written later: four numbers fill a vector.
+    pure subroutine clear(transition)
+        real(wp), intent(inout) :: transition(36, lanes)
+        integer :: l, k
+
+        do l = 1, lanes
+            do k = 19, 31, 6
+                transition(k:k + 3, l) = 0.0_wp
             end do
         end do
-        call transpose_into(sorted, transition)
-    end subroutine store
-
-    !> The transposed of a matrix, four rows at a time, which fill a vector.
-    pure subroutine transpose_into(x, y)
-        real(wp), intent(in) :: x(lanes, 36)
-        real(wp), intent(out) :: y(36, lanes)
-        integer :: l, i
-
-        do l = 1, lanes
-            do i = 1, 33, 4
-                y(i, l) = x(l, i)
-                y(i + 1, l) = x(l, i + 1)
-                y(i + 2, l) = x(l, i + 2)
-                y(i + 3, l) = x(l, i + 3)
-            end do
-        end do
-    end subroutine transpose_into
-
-    !> The same for some of the lanes.
-    pure subroutine store_some(order, block, served, m, q, transition)
-        integer, intent(in) :: order(3)
-        type(tangent_lanes), intent(in) :: block
-        logical, intent(in) :: served(lanes)
-        real(wp), intent(inout) :: m(3, lanes), q(4, lanes), transition(36, lanes)
-        real(wp) :: all_m(3, lanes), all_q(4, lanes), all_transitions(36, lanes)
-        integer :: l
-
-        call store(order, block, all_m, all_q, all_transitions)
-        do l = 1, lanes
-            if (.not. served(l)) cycle
-            m(:, l) = all_m(:, l)
-            q(:, l) = all_q(:, l)
-            transition(:, l) = all_transitions(:, l)
-        end do
-    end subroutine store_some
-
-    !> To and from sorted axes that are right-handed: an odd sorting turns the last axis round.
-    pure subroutine reflect(block)
-        type(tangent_lanes), intent(inout) :: block
-        integer, parameter :: crossed(12) = [3, 6, 9, 12, 13, 14, 16, 17, 24, 30, 34, 35]   ! once in axis 3
-        integer :: i
-
-        block%m(:, 3) = -block%m(:, 3)
-        block%q(:, 3) = -block%q(:, 3)
-        do i = 1, size(crossed)
-            block%transition(:, crossed(i)) = -block%transition(:, crossed(i))
-        end do
-    end subroutine reflect
-
-    !> Whether the largest components of all momenta and attitudes are plain numbers.
-    pure function all_plain(block) result(plain)
-        type(tangent_lanes), intent(in) :: block
-        logical :: plain
-        real(wp) :: size_m, size_q, least, most
-        integer(int64) :: many
-        integer :: l
-
-        many = 0
-        do l = 1, lanes
-            size_m = 0.25_wp*abs(block%m(l, 1)) + (0.25_wp*abs(block%m(l, 2)) + 0.25_wp*abs(block%m(l, 3)))
-            size_q = (0.25_wp*abs(block%q(l, 0)) + 0.25_wp*abs(block%q(l, 1))) &
-                     + (0.25_wp*abs(block%q(l, 2)) + 0.25_wp*abs(block%q(l, 3)))
-            size_m = merge(plain_largest, size_m, ieee_is_nan(size_m))      ! comparing a NaN raises a flag
-            size_q = merge(plain_largest, size_q, ieee_is_nan(size_q))
-            least = min(size_m, size_q)
-            most = max(size_m, size_q)
-            many = many + merge(1_int64, 0_int64, merge(least, 0.0_wp, most < plain_largest) > plain_smallest)
-        end do
-        plain = many == lanes
-    end function all_plain
+    end subroutine clear
 
     !> Whether angles that the body turns in the time h stay far from overflow.
     pure function is_plain_time(body, h) result(plain)

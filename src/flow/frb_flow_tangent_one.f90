@@ -226,6 +226,8 @@ contains
 
     include 'tangent_formulas.inc'
 
+    include 'tangent_turn_formulas.inc'
+
     include 'tangent_short_formulas.inc'
 
     include 'tangent_middle_formulas.inc'
