@@ -14,13 +14,19 @@ contains
 
     include '../src/flow/series_formulas.inc'
 
+    include '../src/flow/short_third_kind.inc'
+
     include '../src/flow/tiny_formulas.inc'
+
+    include '../src/flow/tiny_third_kind.inc'
 
     include '../src/flow/short_formulas.inc'
 
     include '../src/flow/unit_turn_formulas.inc'
 
     include '../src/flow/middle_formulas.inc'
+
+    include '../src/flow/middle_third_kind.inc'
 
     include '../src/flow/long_formulas.inc'
 

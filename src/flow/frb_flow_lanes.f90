@@ -386,8 +386,14 @@ contains
 
     include 'series_formulas.inc'
 
+    include 'short_third_kind.inc'
+
     include 'tiny_formulas.inc'
 
+    include 'tiny_third_kind.inc'
+
     include 'middle_formulas.inc'
+
+    include 'middle_third_kind.inc'
 
 end module frb_flow_lanes

@@ -332,13 +332,19 @@ contains
 
     include 'series_formulas.inc'
 
+    include 'short_third_kind.inc'
+
     include 'tiny_formulas.inc'
+
+    include 'tiny_third_kind.inc'
 
     include 'short_formulas.inc'
 
     include 'unit_turn_formulas.inc'
 
     include 'middle_formulas.inc'
+
+    include 'middle_third_kind.inc'
 
     include 'turn_formulas.inc'
 

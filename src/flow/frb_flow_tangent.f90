@@ -22,7 +22,7 @@
 !>
 !> Method: closed form; the only integrals besides that of the step are those of s^2, s^2/c^2 and s^2/d^2.
 submodule(frb_free_flow) frb_flow_tangent
-    use frb_flow_tangent_body, only: tangent_body
+    use frb_flow_tangent_body, only: jacobian_body, tangent_body
     use frb_flow_tangent_many, only: tangent_many
     implicit none
 
@@ -31,7 +31,7 @@ contains
     module procedure tangent_of_momentum
         integer :: code
 
-        call tangent_body(body%core, h, m, code, 0, jacobian=jacobian)
+        call jacobian_body(body%core, h, m, code, jacobian)
         if (code /= status_ok .or. present(stat)) call conclude(code, 'flow_tangent', stat)
     end procedure tangent_of_momentum
 

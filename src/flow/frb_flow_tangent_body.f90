@@ -7,6 +7,7 @@ module frb_flow_tangent_body
     use frb_flow_tangent_axis, only: follow_axis
     use frb_flow_tangent_inertia, only: inertia_columns, elements_in_axes
     use frb_flow_tangent_long, only: long_tangent
+    use frb_flow_tangent_momentum, only: short_jacobian
     use frb_flow_tangent_one, only: short_tangent
     use frb_flow_tangent_parts, only: step_parts
     use frb_inertia, only: body_core, keep_off_axis
@@ -17,11 +18,37 @@ module frb_flow_tangent_body
     implicit none
     private
 
-    public :: tangent_body
+    public :: tangent_body, jacobian_body
 
     real(wp), parameter :: largest_square_angle = 1.0e40_wp
 
 contains
+
+    !> tangent_body for the momentum alone.
+    pure subroutine jacobian_body(body, h, m, code, jacobian)
+        type(body_core), intent(in) :: body
+        real(wp), intent(in) :: h
+        real(wp), intent(inout) :: m(3)
+        integer, intent(out) :: code
+        real(wp), intent(inout) :: jacobian(3, 3)
+        real(wp) :: size_m
+        logical :: plain, done
+
+        code = body%status
+        size_m = 0.25_wp*abs(m(1)) + (0.25_wp*abs(m(2)) + 0.25_wp*abs(m(3)))
+        plain = are_plain(size_m, size_m, h, body%a(1))
+        plain = plain .and. code == status_ok .and. .not. body%needs_rotation
+        if (plain) then
+            call short_jacobian(body, 0.5_wp*h, m, jacobian, done)
+            if (done) return
+            plain = (body%a(1)*h)**2*(m(1)*m(1) + m(2)*m(2) + m(3)*m(3)) <= largest_square_angle
+        end if
+        if (plain) then
+            call tangent_beyond(body, h, m, 0, jacobian=jacobian)
+        else
+            call tangent_body(body, h, m, code, 0, jacobian=jacobian)
+        end if
+    end subroutine jacobian_body
 
     !> Advances m, and q when present, of any body by h, with `transition` and, if wanted, the derivatives by
     !> the inertia (6, 3) or (6, 6); without q, with `jacobian`. code says why the input was refused, if it
@@ -135,29 +162,49 @@ contains
         real(wp), intent(inout), optional :: jacobian(3, 3)
         real(wp), intent(inout), optional :: by_inertia(6, elements)
         type(step_parts) :: parts
-        real(wp) :: reached, rest
         logical :: done
 
-        if (present(by_inertia)) then
-            call short_tangent(body, 0.5_wp*h, m, done, parts, q, transition)
+        if (present(jacobian)) then
+            call short_jacobian(body, 0.5_wp*h, m, jacobian, done)
+            if (done) return
+        else if (present(by_inertia)) then
+            call short_tangent(body, 0.5_wp*h, m, done, q, transition, parts)
         else
-            call short_tangent(body, 0.5_wp*h, m, done, q=q, transition=transition, jacobian=jacobian)
+            call short_tangent(body, 0.5_wp*h, m, done, q, transition)
         end if
-        reached = 1.0_wp
-        rest = h
         if (.not. done) then
-            call long_tangent(body, 0.5_wp*rest, m, reached, parts, q, transition, jacobian)
-            if (reached < 1.0_wp) then
-                rest = reached*h
-                call long_tangent(body, 0.5_wp*rest, m, reached, parts, q, transition, jacobian)
-                reached = 0.0_wp
-            end if
+            call tangent_beyond(body, h, m, elements, q, transition, jacobian, by_inertia)
+            return
+        end if
+        if (body%parity < 0.0_wp) call reflect(int(body%order(3)), transition)
+        if (present(by_inertia)) call inertia_columns(body, parts, m, elements, by_inertia)
+    end subroutine tangent_plain
+
+    !> The same beyond the series. A motion that settles on the middle axis goes on along this axis.
+    pure subroutine tangent_beyond(body, h, m, elements, q, transition, jacobian, by_inertia)
+        type(body_core), intent(in) :: body
+        real(wp), intent(in) :: h
+        real(wp), intent(inout) :: m(3)
+        integer, intent(in) :: elements
+        real(wp), intent(inout), optional :: q(4)
+        real(wp), intent(inout), optional :: transition(6, 6)
+        real(wp), intent(inout), optional :: jacobian(3, 3)
+        real(wp), intent(inout), optional :: by_inertia(6, elements)
+        type(step_parts) :: parts
+        real(wp) :: reached, part
+
+        part = h
+        call long_tangent(body, 0.5_wp*part, m, reached, parts, q, transition, jacobian)
+        if (reached < 1.0_wp) then
+            part = reached*h
+            call long_tangent(body, 0.5_wp*part, m, reached, parts, q, transition, jacobian)
+            reached = 0.0_wp
         end if
         if (body%parity < 0.0_wp) call reflect(int(body%order(3)), transition, jacobian)
         if (present(by_inertia)) call inertia_columns(body, parts, m, elements, by_inertia)
-        if (reached < 1.0_wp) call follow_axis(body, h - rest, m, elements, q, transition, jacobian, &
+        if (reached < 1.0_wp) call follow_axis(body, h - part, m, elements, q, transition, jacobian, &
                                                by_inertia)
-    end subroutine tangent_plain
+    end subroutine tangent_beyond
 
     !> Sorted axes are right-handed: an odd sorting turns the last one round.
     pure subroutine reflect(axis, transition, jacobian)

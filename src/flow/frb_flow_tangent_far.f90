@@ -332,6 +332,8 @@ contains
 
     include 'middle_formulas.inc'
 
+    include 'middle_third_kind.inc'
+
     include 'long_formulas.inc'
 
     include 'angle_formulas.inc'

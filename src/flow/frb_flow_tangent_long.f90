@@ -46,13 +46,13 @@ contains
         real(wp) :: g1, g2, g3
         real(wp) :: r11, r12, r13, r22, r23, r33, j11, j12, j13, j21, j22, j23, j31, j32, j33, cosine, sine
 
-        call set_orbit(body, t, m, f, it)
+        call set_orbit(body, t, m, present(q), f, it)
         reached = 1.0_wp
         if (it%pmax > settled**2 .and. it%delta <= separatrix*it%pmax) then
             reached = 0.99_wp*settled/sqrt(it%pmax)
             return
         end if
-        call first_part(f, it)
+        call first_part(f, present(q), it)
         cosine = 1.0_wp
         sine = 0.0_wp
         if (present(q)) call uniform_turn(f, it, cosine, sine)
@@ -101,9 +101,10 @@ contains
 
     !> The constants of the motion in the form with the smaller nu, and the part of the half step that is left
     !> when whole periods are taken out.
-    pure subroutine set_orbit(body, t, m, f, it)
+    pure subroutine set_orbit(body, t, m, with_attitude, f, it)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: t, m(3)
+        logical, intent(in) :: with_attitude
         type(step_parts), intent(out) :: f
         type(doubling_state), intent(out) :: it
         real(wp) :: mirror, span
@@ -123,8 +124,8 @@ contains
         it%whole_own = 0.0_wp
         it%many_periods = it%pmax > period_limit .and. it%delta > separatrix*it%pmax
         if (it%many_periods) then
-            call reduce_periods(it%pmax, it%delta, f%nu, it%fraction, it%turned, it%whole_third, &
-                                it%whole_dd, it%whole_own)
+            call reduce_periods(it%pmax, it%delta, f%nu, with_attitude, it%fraction, it%turned, &
+                                it%whole_third, it%whole_dd, it%whole_own)
         end if
         span = it%fraction*it%fraction
         do n = 0, most_halvings - 1
@@ -141,8 +142,9 @@ contains
     end subroutine set_orbit
 
     !> The triple and the integrals at the time that the series reach.
-    pure subroutine first_part(f, it)
+    pure subroutine first_part(f, with_attitude, it)
         type(step_parts), intent(in) :: f
+        logical, intent(in) :: with_attitude
         type(doubling_state), intent(inout) :: it
         real(wp) :: span, s3, aa
 
@@ -152,9 +154,13 @@ contains
         it%s = sqrt(it%y)
         call middle_integrals(it%pmax*it%y, it%pmin*it%y, it%dd, aa, it%own)
         s3 = it%y*it%s
-        it%bg = f%b*sqrt(f%gg)
-        call base_angle(it%bg*f%nu*(s3*middle_third_kind(it%pmax*it%y, it%pmin*it%y, f%nu*it%y)), it%ec, &
-                        it%es)
+        it%ec = 1.0_wp
+        it%es = 0.0_wp
+        if (with_attitude) then
+            it%bg = f%b*sqrt(f%gg)
+            call base_angle(it%bg*f%nu*(s3*middle_third_kind(it%pmax*it%y, it%pmin*it%y, f%nu*it%y)), it%ec, &
+                            it%es)
+        end if
         it%dd = s3*it%dd
         it%own = s3*it%own
         it%z = 1.0_wp
@@ -292,6 +298,8 @@ contains
     include 'orbit_formulas.inc'
 
     include 'middle_formulas.inc'
+
+    include 'middle_third_kind.inc'
 
     include 'long_formulas.inc'
 

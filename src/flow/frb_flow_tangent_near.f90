@@ -256,13 +256,19 @@ contains
 
     include 'series_formulas.inc'
 
+    include 'short_third_kind.inc'
+
     include 'tiny_formulas.inc'
+
+    include 'tiny_third_kind.inc'
 
     include 'short_formulas.inc'
 
     include 'unit_turn_formulas.inc'
 
     include 'middle_formulas.inc'
+
+    include 'middle_third_kind.inc'
 
     include 'join_formulas.inc'
 
@@ -271,6 +277,8 @@ contains
     include 'tangent_turn_formulas.inc'
 
     include 'tangent_short_formulas.inc'
+
+    include 'tangent_short_integrals.inc'
 
     include 'tangent_middle_formulas.inc'
 

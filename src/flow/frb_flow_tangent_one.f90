@@ -16,17 +16,16 @@ module frb_flow_tangent_one
 
 contains
 
-    !> Advances m, and q when present, by 2 t, and forms `transition`, or `jacobian` without q. `done` is
-    !> .false., and nothing is changed, when the series do not reach so far. m /= 0, everything plain.
-    pure subroutine short_tangent(body, t, m, done, parts, q, transition, jacobian)
+    !> Advances m and q by 2 t, and forms `transition`. `done` is .false., and nothing is changed, when the
+    !> series do not reach so far. m /= 0, everything plain.
+    pure subroutine short_tangent(body, t, m, done, q, transition, parts)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: t
         real(wp), intent(inout) :: m(3)
         logical, intent(out) :: done
+        real(wp), intent(inout) :: q(4)
+        real(wp), intent(inout) :: transition(6, 6)
         type(step_parts), intent(inout), optional :: parts  !! for derivatives by the inertia
-        real(wp), intent(inout), optional :: q(4)
-        real(wp), intent(inout), optional :: transition(6, 6)
-        real(wp), intent(inout), optional :: jacobian(3, 3)
         type(step_parts) :: f
         real(wp) :: x, v, x1, x2, x3, v1, v2, v3, over_w, over_gg, twice, k, psi
         real(wp) :: r11, r12, r13, r22, r23, r33, j11, j12, j13, j21, j22, j23, j31, j32, j33
@@ -39,11 +38,7 @@ contains
         call advance_momentum(f, m)
         call short_gradients(f%a, f%b, f%g, f%m1, f%m2, f%m3, f%gg, f%p, f%r, f%nu, f%y, f%scd, f%aa, f%bb, &
                              x, v, x1, x2, x3, v1, v2, v3, over_w, over_gg)
-        if (present(q)) then
-            call advance_attitude(f, reach, q, twice, transition)
-        else
-            twice = 2/(1 + (x*x + v*v))
-        end if
+        call advance_attitude(f, reach, q, twice, transition)
         call turn_matrix(1.0_wp, x, v, twice, r11, r12, r13, r22, r23, r33)
         x1 = twice*x1
         x2 = twice*x2
@@ -53,10 +48,6 @@ contains
         v3 = twice*v3
         call tangent_of_momentum(1.0_wp, x, v, r11, r12, r13, r22, r23, r33, x1, x2, x3, v1, v2, v3, f%e1, &
                                  f%e2, f%e3, j11, j12, j13, j21, j22, j23, j31, j32, j33)
-        if (.not. present(q)) then
-            call put(f%o1, f%o2, f%o3, 3, 0, j11, j12, j13, j21, j22, j23, j31, j32, j33, jacobian)
-            return
-        end if
         call put(f%o1, f%o2, f%o3, 6, 0, j11, j12, j13, j21, j22, j23, j31, j32, j33, transition)
         psi = -2*(f%b*f%g)*((f%dd + (1 - f%r*f%y)*f%bb)*over_w)
         k = 2*((f%rate - f%along*f%cosine) - (f%b*f%nu)*((1 - f%p*f%y)*f%aa*over_w))*over_gg
@@ -210,13 +201,19 @@ contains
 
     include 'series_formulas.inc'
 
+    include 'short_third_kind.inc'
+
     include 'tiny_formulas.inc'
+
+    include 'tiny_third_kind.inc'
 
     include 'short_formulas.inc'
 
     include 'unit_turn_formulas.inc'
 
     include 'middle_formulas.inc'
+
+    include 'middle_third_kind.inc'
 
     include 'turn_formulas.inc'
 
@@ -229,6 +226,8 @@ contains
     include 'tangent_turn_formulas.inc'
 
     include 'tangent_short_formulas.inc'
+
+    include 'tangent_short_integrals.inc'
 
     include 'tangent_middle_formulas.inc'
 

@@ -10,14 +10,16 @@ module frb_flow_tangent_periods
 contains
 
     !> As in frb_flow_long, with the integrals D and `own` over what is taken out.
-    pure subroutine reduce_periods(pmax, delta, nu, fraction, turned, whole_third, whole_dd, whole_own)
+    pure subroutine reduce_periods(pmax, delta, nu, with_third, fraction, turned, whole_third, whole_dd, &
+                                   whole_own)
         real(wp), intent(in) :: pmax, delta, nu
+        logical, intent(in) :: with_third       !! .false.: whole_third is not wanted, and means nothing
         real(wp), intent(out) :: fraction, turned, whole_third, whole_dd, whole_own
         real(wp), parameter :: most_exact = 2.0_wp**26
         real(wp), parameter :: round_up = 6755399441055744.0_wp    ! 3 * 2^51: adding it rounds to an integer
         real(wp) :: period, mean_third, mean_dd, mean_own, half, number, high
 
-        call quarter_means(pmax, delta, nu, period, mean_third, mean_dd, mean_own)
+        call quarter_means(pmax, delta, nu, with_third, period, mean_third, mean_dd, mean_own)
         half = 2*period
         number = 1/half
         if (number <= most_exact) then
@@ -43,8 +45,9 @@ contains
 
     !> The quarter period and the means over it of s^2/(1 + nu s^2), s^2 and s^2/dn^2: the sum of
     !> quarter_period with p_0^2 = pmax + nu, pmax and delta, for one sequence a_j, g_j.
-    pure subroutine quarter_means(pmax, delta, nu, period, mean_third, mean_dd, mean_own)
+    pure subroutine quarter_means(pmax, delta, nu, with_third, period, mean_third, mean_dd, mean_own)
         real(wp), intent(in) :: pmax, delta, nu
+        logical, intent(in) :: with_third
         real(wp), intent(out) :: period, mean_third, mean_dd, mean_own
         integer, parameter :: most = 20
         real(wp), parameter :: negligible = 1.0e-17_wp, close = 1.0e-9_wp
@@ -62,9 +65,10 @@ contains
         mean_third = 1.0_wp
         mean_dd = 1.0_wp
         mean_own = 1.0_wp
+        e1 = 0.0_wp
         do j = 1, most
             ag = a*g
-            call next_term(ag, p1, q1, e1, mean_third)
+            if (with_third) call next_term(ag, p1, q1, e1, mean_third)
             call next_term(ag, p2, q2, e2, mean_dd)
             call next_term(ag, p3, q3, e3, mean_own)
             a = 0.5_wp*(a + g)

@@ -200,7 +200,11 @@ contains
 
     include '../flow/series_formulas.inc'
 
+    include '../flow/short_third_kind.inc'
+
     include '../flow/tiny_formulas.inc'
+
+    include '../flow/tiny_third_kind.inc'
 
     include '../flow/short_formulas.inc'
 
