@@ -30,10 +30,11 @@ git -c safe.directory='*' ls-files -z --cached --others --exclude-standard |
     while IFS= read -r -d '' file; do [ ! -e "$file" ] || printf '%s\0' "$file"; done |
     tar --null -T - -cf "$work/tree.tar" || exit 1
 
-# copy_of_tree FOLDER: makes it, with the set-up of the first copy once there is one.
+# copy_of_tree FOLDER: makes it, with the set-up of the first copy and what was built there once there is any.
 copy_of_tree() {
     mkdir -p "$1" && tar -xf "$work/tree.tar" -C "$1"
     [ "$1" = "$clone" ] || [ ! -e "$clone/.venv" ] || ln -s "$clone/.venv" "$1/.venv"
+    [ "$1" = "$clone" ] || [ ! -e "$clone/build" ] || cp -a "$clone/build" "$1/build"
 }
 clone=$work/frb
 copy_of_tree "$clone" || exit 1

@@ -105,7 +105,7 @@ contains
         real(wp), intent(inout), optional :: t
         class(body_drift), intent(in), optional :: drift
         logical, intent(in), optional :: compensated
-        real(wp), contiguous, intent(inout), optional :: rests(:, :)
+        real(wp), intent(inout), optional :: rests(:, :)
         logical, intent(in), optional :: joined
         integer, intent(out), optional :: stat
 
@@ -149,7 +149,7 @@ contains
         real(wp), intent(inout), optional :: t
         class(body_drift), intent(in), optional :: drift
         logical, intent(in), optional :: compensated
-        real(wp), contiguous, intent(inout), optional :: rests(:, :)
+        real(wp), intent(inout), optional :: rests(:, :)
         logical, intent(in), optional :: joined
         integer, intent(out), optional :: stat
 
@@ -171,7 +171,7 @@ contains
         real(wp), intent(inout), optional :: t
         class(body_drift), intent(in), optional :: drift
         logical, intent(in), optional :: compensated
-        real(wp), contiguous, intent(inout), optional :: rests(:, :)
+        real(wp), intent(inout), optional :: rests(:, :)
         logical, intent(in), optional :: joined
         integer, intent(out), optional :: stat
 

@@ -51,7 +51,7 @@ contains
         real(wp), intent(inout), optional :: t                      !! time, goes on by nsteps*h; from 0
         class(body_drift), intent(in), optional, target :: drift    !! default: the free flow, in a batch
         logical, intent(in), optional :: compensated                !! default: .false.
-        real(wp), contiguous, intent(inout), optional :: rests(:, :)    !! (7, n): what m and q lack; from 0
+        real(wp), intent(inout), optional :: rests(:, :)    !! (7, n): what m and q lack; from 0
         logical, intent(in), optional :: joined                     !! default: .false.
         integer, intent(out), optional :: stat                      !! status code
         type(splitting_plan) :: plan
