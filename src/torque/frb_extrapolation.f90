@@ -9,12 +9,14 @@
 !> times as long with AVX2.) Tolerances below 1e-13 and from 1e-5 on take other sequences: see
 !> frb_extrapolation_sets.
 module frb_extrapolation
+    use frb_extrapolation_control, only: first_step, without_sliver, series_reach, within_reach, &
+        first_terms_do
     use frb_extrapolation_step, only: extrapolated_body, new_extrapolated_body, ask_torque, try_step, &
         accept_step, rounding
-    use frb_extrapolation_sets, only: powers, reaches
+    use frb_extrapolation_sets, only: powers
     use frb_free_flow, only: core_of, rigid_body
     use frb_kinds, only: wp
-    use frb_rotations, only: is_unit_quat, norm3, quat_conjugate, quat_product, quat_rotate
+    use frb_rotations, only: is_unit_quat, quat_conjugate, quat_product, quat_rotate
     use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_count, status_bad_momentum, &
         status_bad_option, status_bad_time, status_bad_torque, status_stopped, status_too_rough
     use frb_torque, only: body_scene, body_observer
@@ -96,15 +98,15 @@ contains
         type(extrapolation_report), intent(out), optional :: report
         type(extrapolated_body) :: moved
         type(extrapolation_report) :: told
-        real(wp) :: now, fixed
+        real(wp) :: t_now, fixed
         integer :: code
 
-        now = 0.0_wp
-        if (present(t)) now = t
+        t_now = 0.0_wp
+        if (present(t)) t_now = t
         fixed = 0.0_wp
         if (present(step)) fixed = step
         code = body%status()
-        if (code == status_ok) code = check_times(time, now, fixed, tolerance)
+        if (code == status_ok) code = check_times(time, t_now, fixed, tolerance)
         if (code == status_ok .and. .not. all(ieee_is_finite(m))) code = status_bad_momentum
         if (code == status_ok .and. .not. is_unit_quat(q)) code = status_bad_attitude
         call scene%agree(code)
@@ -113,10 +115,10 @@ contains
                 told%tolerance = max(tolerance, rounding)
                 moved = new_extrapolated_body(core, m, q, .true., told%tolerance)
                 if (present(compensated)) moved%compensated = compensated
-                call run_steps(moved, scene, time, fixed, now, told, code, observer)
+                call run_steps(moved, scene, time, fixed, t_now, told, code, observer)
                 call state_of(moved, m, q)
             end associate
-            if (present(t)) t = now
+            if (present(t)) t = t_now
         end if
         if (present(report)) report = told
         ! An observer that stops a run has done what it was there for.
@@ -154,19 +156,19 @@ contains
         integer, intent(out), optional :: stat                      !! the first code that is not `status_ok`
         type(extrapolation_report), intent(out), optional :: report !! sums, and extremes of all
         type(extrapolation_report) :: one, told
-        real(wp) :: now
+        real(wp) :: t_now
         integer :: code, refused, i
 
         code = status_bad_count
         if (size(m, 1) == 3 .and. size(q, 1) == 4 .and. size(q, 2) == size(m, 2) &
             .and. (size(body) == 1 .or. size(body) == size(m, 2))) code = status_ok
-        now = 0.0_wp
+        t_now = 0.0_wp
         if (code == status_ok) then
             do i = 1, size(m, 2)
-                now = 0.0_wp
-                if (present(t)) now = t
+                t_now = 0.0_wp
+                if (present(t)) t_now = t
                 call extrapolate_body(body(min(i, size(body))), scene, time, m(:, i), q(:, i), tolerance, &
-                                      now, step=step, compensated=compensated, stat=refused, report=one)
+                                      t_now, step=step, compensated=compensated, stat=refused, report=one)
                 if (code == status_ok) code = refused
                 told%torques = told%torques + one%torques
                 told%rejected = told%rejected + one%rejected
@@ -176,7 +178,7 @@ contains
                 told%shortest = merge(one%shortest, min(told%shortest, one%shortest), told%steps == 0)
                 told%steps = told%steps + one%steps
             end do
-            if (code == status_ok .and. present(t) .and. size(m, 2) > 0) t = now
+            if (code == status_ok .and. present(t) .and. size(m, 2) > 0) t = t_now
         end if
         if (present(report)) report = told
         call conclude(code, 'extrapolate', stat)
@@ -198,38 +200,36 @@ contains
         code = status_ok
     end function check_times
 
-    !> The steps of a run, from time `now` on; `now` and the state are those of the last step taken.
-    subroutine run_steps(moved, scene, time, fixed, now, told, code, observer)
+    !> The steps of a run, from time `t_now` on; `t_now` and the state are those of the last step taken.
+    subroutine run_steps(moved, scene, time, fixed, t_now, told, code, observer)
         type(extrapolated_body), intent(inout) :: moved
         class(body_scene), intent(inout) :: scene
         real(wp), intent(in) :: time, fixed
-        real(wp), intent(inout) :: now
+        real(wp), intent(inout) :: t_now
         type(extrapolation_report), intent(inout) :: told
         integer, intent(out) :: code
         class(body_observer), intent(inout), optional :: observer
-        real(wp) :: start, left, h, least, guess, ratio, factor, before, reach, few_reach
+        real(wp) :: start, left, h, least, guess, ratio, factor, before, reach, few_angle
         integer :: short_steps, refused
         logical :: accepted, last
 
-        start = now
+        start = t_now
         left = time
         code = status_ok
         guess = 0.0_wp
         h = 0.0_wp
         before = 0.0_wp
-        ! Steps for which the first terms of the series do: the others change such steps by less than the
-        ! tolerance, as measured on tops.
-        few_reach = min(3.0_wp, 14*told%tolerance**(1/12.0_wp))/reaches(moved%set)
-        if (fixed > 0.0_wp) few_reach = 0.0_wp
+        few_angle = 14*told%tolerance**(1/12.0_wp)
+        if (fixed > 0.0_wp) few_angle = 0.0_wp
         short_steps = 0
-        if (present(observer)) call show(moved, scene, 0_int64, now, observer, code)
+        if (present(observer)) call show(moved, scene, 0_int64, t_now, observer, code)
         do while (code == status_ok .and. abs(left) > 0.0_wp)
-            if (.not. moved%torque_known) call ask_torque(moved, scene, now, told%torques, code)
+            if (.not. moved%torque_known) call ask_torque(moved, scene, t_now, told%torques, code)
             if (.not. guess > 0.0_wp) then
-                guess = first_step(moved, scene, now, left, told)
+                guess = first_step(moved, scene, t_now, left, told%tolerance, told%torques)
                 h = guess
             end if
-            least = 4*epsilon(h)*max(abs(now), abs(left), tiny(h)/epsilon(h))
+            least = 4*epsilon(h)*max(abs(t_now), abs(left), tiny(h)/epsilon(h))
             reach = series_reach(moved)
             if (fixed > 0.0_wp) then
                 h = abs(left)/max(1_int64, ceiling(abs(left)/fixed*(1 - 8*epsilon(h)), int64))
@@ -238,8 +238,8 @@ contains
             end if
             last = h >= abs(left)
             if (last) h = abs(left)
-            call try_step(moved, scene, now, sign(h, time), h > 1.01_wp*reach, h < few_reach*reach, &
-                          told%torques, refused)
+            call try_step(moved, scene, t_now, sign(h, time), h > 1.01_wp*reach, &
+                          first_terms_do(moved, h/reach, few_angle), told%torques, refused)
             if (code == status_ok) code = refused
             ! A step that is rejected is shortened without end only where there is a NaN.
             ratio = min(moved%error, 1.0_wp)/told%tolerance
@@ -258,96 +258,20 @@ contains
             end if
             call accept_step(moved, sign(h, time), code)
             left = merge(0.0_wp, left - sign(h, time), last)
-            now = merge(start + time, start + (time - left), last)
+            t_now = merge(start + time, start + (time - left), last)
             call note_step(told, h, moved%error, last)
             short_steps = merge(short_steps + 1, 0, h < 1.0e-6_wp*guess .and. .not. fixed > 0.0_wp)
             if (code == status_ok .and. short_steps > 10000) code = status_too_rough
             if (code == status_ok .and. present(observer)) then
-                call show(moved, scene, told%steps, now, observer, code)
+                call show(moved, scene, told%steps, t_now, observer, code)
             end if
             h = h*min(factor, 4.0_wp)
             ! The mean, on a logarithmic scale, of this and what was to follow the step before: it follows
             ! less what the estimate does from step to step, which saves 8 % of the steps.
-            if (before > 0.0_wp) h = sqrt(h*before)
+            if (before > 0.0_wp) h = sqrt(h)*sqrt(before)
             before = h
         end do
     end subroutine run_steps
-
-    !> The first step to be tried, by the torque at the start or, where a body feels none there, by that where
-    !> the free body will be after half a radian.
-    function first_step(moved, scene, now, left, told) result(h)
-        type(extrapolated_body), intent(in) :: moved
-        class(body_scene), intent(inout) :: scene
-        real(wp), intent(in) :: now, left
-        type(extrapolation_report), intent(inout) :: told
-        real(wp) :: h
-        type(extrapolated_body) :: ahead
-        real(wp) :: rate
-        integer :: code
-
-        ahead = moved
-        if (.not. maxval(abs(ahead%tau)) > 0.0_wp) then
-            h = left/2
-            rate = norm3(moved%core%a*moved%x(moved%core%order))
-            if (rate > 1/abs(left)) h = sign(0.5_wp/rate, left)
-            ahead%is_free = .true.
-            call accept_step(ahead, h, code)
-            ! What it refuses there, it refuses when a step gets there.
-            if (code == status_ok) call ask_torque(ahead, scene, now + h, told%torques, code)
-        end if
-        h = step_for(moved, ahead%tau, told%tolerance)
-    end function first_step
-
-    !> The step h, or one that divides what is left, if that is not much longer; a little longer than h if
-    !> that saves one.
-    pure function without_sliver(h, left) result(chosen)
-        real(wp), intent(in) :: h, left
-        real(wp) :: chosen
-
-        chosen = h
-        if (h < left .and. h > 0.3_wp*left) chosen = left/ceiling(0.92_wp*(left/h))
-    end function without_sliver
-
-    !> The step whose error is about the tolerance under a torque: the error of a step is some
-    !> constant (|n|/Omega) h (Omega h)^(power - 1), n the angular acceleration by the torque, Omega the
-    !> largest rate.
-    pure function step_for(moved, torque, tolerance) result(h)
-        type(extrapolated_body), intent(in) :: moved
-        real(wp), intent(in) :: torque(3), tolerance
-        real(wp) :: h
-        real(wp), parameter :: constants(*) = [1.6e-11_wp, 1.6e-11_wp, 2.5e-8_wp]
-        real(wp) :: acceleration, rate
-
-        acceleration = norm3(moved%core%a*torque(moved%core%order))
-        h = huge(h)
-        if (.not. acceleration > 0.0_wp) return
-        rate = max(norm3(moved%core%a*moved%x(moved%core%order)), sqrt(acceleration))
-        h = exp((log(tolerance/constants(moved%set)) - log(acceleration) &
-                 - (powers(moved%set) - 2)*log(rate))/powers(moved%set))
-    end function step_for
-
-    !> How long a step may be for the series of the lanes: the half angle of its shortest drifts is then below
-    !> 0.5.
-    pure function series_reach(moved) result(h)
-        type(extrapolated_body), intent(in) :: moved
-        real(wp) :: h
-        real(wp), parameter :: longest = 1.0e300_wp
-        real(wp) :: rate
-
-        h = longest
-        rate = moved%core%a(1)*norm3(moved%x(1:3))
-        if (rate > 8/longest) h = reaches(moved%set)/rate
-    end function series_reach
-
-    !> The step h, or that of the series if it is not much shorter: the free flow takes some four times as
-    !> long as they do.
-    pure function within_reach(reach, h) result(chosen)
-        real(wp), intent(in) :: reach, h
-        real(wp) :: chosen
-
-        chosen = h
-        if (h > reach .and. h < 5*reach) chosen = reach
-    end function within_reach
 
     !> Takes a step that was accepted into the report.
     pure subroutine note_step(told, h, error, last)
@@ -379,11 +303,11 @@ contains
     end subroutine state_of
 
     !> Shows the state to the observer; `code` is that of the scene, or `status_stopped`.
-    subroutine show(moved, scene, step, now, observer, code)
+    subroutine show(moved, scene, step, t_now, observer, code)
         type(extrapolated_body), intent(in) :: moved
         class(body_scene), intent(inout) :: scene
         integer(int64), intent(in) :: step
-        real(wp), intent(in) :: now
+        real(wp), intent(in) :: t_now
         class(body_observer), intent(inout) :: observer
         integer, intent(out) :: code
         real(wp) :: m(3), q(4)
@@ -391,7 +315,7 @@ contains
 
         call state_of(moved, m, q)
         stop_here = .false.
-        call observer%observe(step, now, m, q, stop_here)
+        call observer%observe(step, t_now, m, q, stop_here)
         code = merge(status_stopped, status_ok, stop_here)
         call scene%agree(code)
     end subroutine show

@@ -57,68 +57,72 @@ contains
     !> All lanes at the start of a step: x = (m, q) in the axes of the form and of the body, what x lacks, and
     !> the torque there. Whole vectors here and below, in one loop over the lanes: one of which a lane was
     !> stored by itself has to wait to be loaded.
-    pure subroutine start_lanes(start, rest, torque, now)
+    pure subroutine start_lanes(start, rest, torque, state)
         real(wp), intent(in) :: start(7), rest(7), torque(3)
-        type(state_of_lanes), intent(out) :: now
+        type(state_of_lanes), intent(out) :: state
         integer :: l
 
         do l = 1, lanes
-            now%m(l, 1) = start(1)
-            now%m(l, 2) = start(2)
-            now%m(l, 3) = start(3)
-            now%q(l, 1) = start(4)
-            now%q(l, 2) = start(5)
-            now%q(l, 3) = start(6)
-            now%q(l, 4) = start(7)
-            now%m_rest(l, 1) = rest(1)
-            now%m_rest(l, 2) = rest(2)
-            now%m_rest(l, 3) = rest(3)
-            now%q_rest(l, 1) = rest(4)
-            now%q_rest(l, 2) = rest(5)
-            now%q_rest(l, 3) = rest(6)
-            now%q_rest(l, 4) = rest(7)
-            now%tau(l, 1) = torque(1)
-            now%tau(l, 2) = torque(2)
-            now%tau(l, 3) = torque(3)
-            now%sizes(l) = 0.0_wp
+            state%m(l, 1) = start(1)
+            state%m(l, 2) = start(2)
+            state%m(l, 3) = start(3)
+            state%q(l, 1) = start(4)
+            state%q(l, 2) = start(5)
+            state%q(l, 3) = start(6)
+            state%q(l, 4) = start(7)
+            state%m_rest(l, 1) = rest(1)
+            state%m_rest(l, 2) = rest(2)
+            state%m_rest(l, 3) = rest(3)
+            state%q_rest(l, 1) = rest(4)
+            state%q_rest(l, 2) = rest(5)
+            state%q_rest(l, 3) = rest(6)
+            state%q_rest(l, 4) = rest(7)
+            state%tau(l, 1) = torque(1)
+            state%tau(l, 2) = torque(2)
+            state%tau(l, 3) = torque(3)
+            state%sizes(l) = 0.0_wp
         end do
-        now%change = 0.0_wp
-        now%error = 0.0_wp
+        state%change = 0.0_wp
+        state%error = 0.0_wp
     end subroutine start_lanes
 
     !> Ends sequences: adds what each has changed, its last kick by h kick tau included, with its weights,
-    !> which are 0 in a lane that goes on. Lanes with begin = 1 are then at the start again. m in the axes of
-    !> the form, tau in those of the body, handed over in the order of the form.
-    pure subroutine end_sequences(form, h, kick, weight, difference, begin, start, rest, torque, tau1, tau2, &
-                                  tau3, now)
+    !> which are 0 in a lane that goes on. Lanes with begin = 1 are then at the start again.
+    pure subroutine end_sequences(form, h, kick, weight, difference, begin, start, rest, torque, state)
         type(form_of_step), intent(in) :: form
         real(wp), intent(in) :: h, start(7), rest(7), torque(3)
-        real(wp), intent(in), dimension(lanes) :: kick, weight, difference, begin, tau1, tau2, tau3
-        type(state_of_lanes), intent(inout) :: now
-        integer :: l
+        real(wp), intent(in), dimension(lanes) :: kick, weight, difference, begin
+        type(state_of_lanes), intent(inout) :: state
+        integer :: l, i1, i2, i3
 
+        i1 = form%axis(1)
+        i2 = form%axis(2)
+        i3 = form%axis(3)
         do l = 1, lanes
-            call end_number(begin(l), weight(l), difference(l), start(1), rest(1), h*kick(l)*tau1(l), &
-                            now%m(l, 1), now%m_rest(l, 1), now%change(l, 1), now%error(l, 1))
-            call end_number(begin(l), weight(l), difference(l), start(2), rest(2), h*kick(l)*tau2(l), &
-                            now%m(l, 2), now%m_rest(l, 2), now%change(l, 2), now%error(l, 2))
+            call end_number(begin(l), weight(l), difference(l), start(1), rest(1), &
+                            h*kick(l)*state%tau(l, i1), state%m(l, 1), state%m_rest(l, 1), &
+                            state%change(l, 1), state%error(l, 1))
+            call end_number(begin(l), weight(l), difference(l), start(2), rest(2), &
+                            h*kick(l)*state%tau(l, i2), state%m(l, 2), state%m_rest(l, 2), &
+                            state%change(l, 2), state%error(l, 2))
             call end_number(begin(l), weight(l), difference(l), start(3), rest(3), &
-                            form%sign3*(h*kick(l))*tau3(l), now%m(l, 3), now%m_rest(l, 3), &
-                            now%change(l, 3), now%error(l, 3))
+                            form%sign3*(h*kick(l))*state%tau(l, i3), state%m(l, 3), state%m_rest(l, 3), &
+                            state%change(l, 3), state%error(l, 3))
             call end_number(begin(l), weight(l), difference(l), start(4), rest(4), 0.0_wp, &
-                            now%q(l, 1), now%q_rest(l, 1), now%change(l, 4), now%error(l, 4))
+                            state%q(l, 1), state%q_rest(l, 1), state%change(l, 4), state%error(l, 4))
             call end_number(begin(l), weight(l), difference(l), start(5), rest(5), 0.0_wp, &
-                            now%q(l, 2), now%q_rest(l, 2), now%change(l, 5), now%error(l, 5))
+                            state%q(l, 2), state%q_rest(l, 2), state%change(l, 5), state%error(l, 5))
             call end_number(begin(l), weight(l), difference(l), start(6), rest(6), 0.0_wp, &
-                            now%q(l, 3), now%q_rest(l, 3), now%change(l, 6), now%error(l, 6))
+                            state%q(l, 3), state%q_rest(l, 3), state%change(l, 6), state%error(l, 6))
             call end_number(begin(l), weight(l), difference(l), start(7), rest(7), 0.0_wp, &
-                            now%q(l, 4), now%q_rest(l, 4), now%change(l, 7), now%error(l, 7))
+                            state%q(l, 4), state%q_rest(l, 4), state%change(l, 7), state%error(l, 7))
         end do
         do l = 1, lanes
-            now%sizes(l) = now%sizes(l) + (abs(tau1(l)) + abs(tau2(l)) + abs(tau3(l)))
-            now%tau(l, 1) = begin(l)*torque(1) + (1 - begin(l))*now%tau(l, 1)
-            now%tau(l, 2) = begin(l)*torque(2) + (1 - begin(l))*now%tau(l, 2)
-            now%tau(l, 3) = begin(l)*torque(3) + (1 - begin(l))*now%tau(l, 3)
+            state%sizes(l) = state%sizes(l) &
+                + (abs(state%tau(l, 1)) + abs(state%tau(l, 2)) + abs(state%tau(l, 3)))
+            state%tau(l, 1) = begin(l)*torque(1) + (1 - begin(l))*state%tau(l, 1)
+            state%tau(l, 2) = begin(l)*torque(2) + (1 - begin(l))*state%tau(l, 2)
+            state%tau(l, 3) = begin(l)*torque(3) + (1 - begin(l))*state%tau(l, 3)
         end do
     end subroutine end_sequences
 
@@ -137,8 +141,7 @@ contains
     end subroutine end_number
 
     !> Kick and drift, see kick_and_drift.inc, exact to rounding up to short_limit.
-    pure subroutine kick_and_drift(form, h, half, kick, tau1, tau2, tau3, m, q0, q1, q2, q3, m_rest, rest0, &
-                                   rest1, rest2, rest3, sizes)
+    pure subroutine kick_and_drift(form, h, half, kick, state)
 
         include 'kick_and_drift.inc'
 
@@ -161,8 +164,7 @@ contains
     end subroutine kick_and_drift
 
     !> Kick and drift, see kick_and_drift.inc, by the first terms of the series, which saves 8 % of a step.
-    pure subroutine kick_and_drift_few(form, h, half, kick, tau1, tau2, tau3, m, q0, q1, q2, q3, m_rest, &
-                                       rest0, rest1, rest2, rest3, sizes)
+    pure subroutine kick_and_drift_few(form, h, half, kick, state)
 
         include 'kick_and_drift.inc'
 

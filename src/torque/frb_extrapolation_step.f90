@@ -90,7 +90,7 @@ contains
         integer(int64), intent(inout) :: asked
         integer, intent(out) :: code
         type(form_of_step) :: form
-        type(state_of_lanes) :: now
+        type(state_of_lanes) :: state
         real(wp) :: start(7), rest(7), change(7), error(7), largest
         integer :: j, e, set, refused
 
@@ -99,44 +99,36 @@ contains
         form = chosen_form(self%core, self%x(1:3))
         start = in_form(form, self%x)
         rest = in_form(form, self%rest)
-        call start_lanes(start, rest, self%tau, now)
-        associate (i1 => form%axis(1), i2 => form%axis(2), i3 => form%axis(3))
-            do j = 1, stages(set)
-                if (exact) then
-                    call kick_and_drift_exactly(self%core, form, h, half(:, j, set), kick(:, j, set), now)
-                else if (few) then
-                    call kick_and_drift_few(form, h, half(:, j, set), kick(:, j, set), now%tau(1, i1), &
-                        now%tau(1, i2), now%tau(1, i3), now%m, now%q(1, 1), now%q(1, 1 + i1), &
-                        now%q(1, 1 + i2), now%q(1, 1 + i3), now%m_rest, now%q_rest(1, 1), &
-                        now%q_rest(1, 1 + i1), now%q_rest(1, 1 + i2), now%q_rest(1, 1 + i3), now%sizes)
-                else
-                    call kick_and_drift(form, h, half(:, j, set), kick(:, j, set), now%tau(1, i1), &
-                        now%tau(1, i2), now%tau(1, i3), now%m, now%q(1, 1), now%q(1, 1 + i1), &
-                        now%q(1, 1 + i2), now%q(1, 1 + i3), now%m_rest, now%q_rest(1, 1), &
-                        now%q_rest(1, 1 + i1), now%q_rest(1, 1 + i2), now%q_rest(1, 1 + i3), now%sizes)
-                end if
-                call torque_of_lanes(self, scene, t, h, time_after(:, j, set), now, refused)
-                if (code == status_ok) code = refused
-                if (any_ends(j, set)) then
-                    call end_sequences(form, h, half(:, j, set), last_weights(:, j, set), &
-                                       last_differences(:, j, set), begin(:, j + 1, set), start, rest, &
-                                       self%tau, now%tau(1, i1), now%tau(1, i2), now%tau(1, i3), now)
-                end if
-            end do
-            do e = 1, 7
-                change(e) = sum(now%change(:, e))
-                error(e) = sum(now%error(:, e))
-            end do
-            self%change([i1, i2, i3]) = change(1:3)
-            self%change(i3) = form%sign3*change(3)
-        end associate
+        call start_lanes(start, rest, self%tau, state)
+        do j = 1, stages(set)
+            if (exact) then
+                call kick_and_drift_exactly(self%core, form, h, half(:, j, set), kick(:, j, set), state)
+            else if (few) then
+                call kick_and_drift_few(form, h, half(:, j, set), kick(:, j, set), state)
+            else
+                call kick_and_drift(form, h, half(:, j, set), kick(:, j, set), state)
+            end if
+            call torque_of_lanes(self, scene, t, h, time_after(:, j, set), state, refused)
+            if (code == status_ok) code = refused
+            if (any_ends(j, set)) then
+                call end_sequences(form, h, half(:, j, set), last_weights(:, j, set), &
+                                   last_differences(:, j, set), begin(:, j + 1, set), start, rest, &
+                                   self%tau, state)
+            end if
+        end do
+        do e = 1, 7
+            change(e) = sum(state%change(:, e))
+            error(e) = sum(state%error(:, e))
+        end do
+        self%change(form%axis) = change(1:3)
+        self%change(form%axis(3)) = form%sign3*change(3)
         self%change(4:7) = change(4:7)
         asked = asked + torques_of_step(set)
         self%error = 1.0_wp
         self%is_free = .false.
-        self%is_finite = ieee_is_finite(sum(now%sizes) + sum(abs(change)))
+        self%is_finite = ieee_is_finite(sum(state%sizes) + sum(abs(change)))
         if (.not. self%is_finite) return
-        self%is_free = .not. sum(now%sizes) > 0.0_wp
+        self%is_free = .not. sum(state%sizes) > 0.0_wp
         if (self%is_free) error = 0.0_wp
         largest = max(maxval(abs(start(1:3))), maxval(abs(start(1:3) + change(1:3))), tiny(largest))
         self%error = sqrt(sum((error(1:3)*(1/largest))**2) + sum(error(4:7)**2))
@@ -155,11 +147,11 @@ contains
     end function in_form
 
     !> The torques of the lanes at time t + h times `after`, in principal axes; 0 where the scene refuses.
-    subroutine torque_of_lanes(self, scene, t, h, after, now, code)
+    subroutine torque_of_lanes(self, scene, t, h, after, state, code)
         type(extrapolated_body), intent(in) :: self
         class(body_scene), intent(inout) :: scene
         real(wp), intent(in) :: t, h, after(lanes)
-        type(state_of_lanes), intent(inout) :: now
+        type(state_of_lanes), intent(inout) :: state
         integer, intent(out) :: code
         real(wp) :: time(scene_lanes), q_body(scene_lanes, 4), back(4), one(4)
         integer :: l
@@ -171,41 +163,41 @@ contains
         if (self%other_axes) then
             back = quat_conjugate(self%core%axes_q)
             do l = 1, lanes
-                one = now%q(l, :)
+                one = state%q(l, :)
                 q_body(l, :) = quat_product(one, back)
                 q_body(lanes + l, :) = q_body(l, :)
             end do
-            call scene%torque_lanes(q_body, time, now%tau, code)
+            call scene%torque_lanes(q_body, time, state%tau, code)
             do l = 1, lanes
-                one(1:3) = now%tau(l, :)
-                now%tau(l, :) = quat_rotate(back, one(1:3))
+                one(1:3) = state%tau(l, :)
+                state%tau(l, :) = quat_rotate(back, one(1:3))
             end do
         else
-            call scene%torque_lanes(now%q, time, now%tau, code)
+            call scene%torque_lanes(state%q, time, state%tau, code)
         end if
-        if (code /= status_ok) now%tau = 0.0_wp
+        if (code /= status_ok) state%tau = 0.0_wp
     end subroutine torque_of_lanes
 
     !> Kick and drift of the lanes by the free flow itself, for drifts of any length.
-    subroutine kick_and_drift_exactly(core, form, h, half, kick, now)
+    subroutine kick_and_drift_exactly(core, form, h, half, kick, state)
         type(body_core), intent(in) :: core
         type(form_of_step), intent(in) :: form
         real(wp), intent(in) :: h, half(lanes), kick(lanes)
-        type(state_of_lanes), intent(inout) :: now
+        type(state_of_lanes), intent(inout) :: state
         real(wp) :: m(3), q(4)
         integer :: l, code
 
         do l = 1, lanes
-            now%sizes(l) = now%sizes(l) + sum(abs(now%tau(l, :)))
-            m(form%axis) = [now%m(l, 1), now%m(l, 2), form%sign3*now%m(l, 3)]
-            m = m + h*kick(l)*now%tau(l, :)
-            q = now%q(l, :)
+            state%sizes(l) = state%sizes(l) + sum(abs(state%tau(l, :)))
+            m(form%axis) = [state%m(l, 1), state%m(l, 2), form%sign3*state%m(l, 3)]
+            m = m + h*kick(l)*state%tau(l, :)
+            q = state%q(l, :)
             ! What it refuses is not finite, and shows in the result.
             call flow_one(core, 2*h*half(l), m, code, q)
-            now%m(l, :) = m(form%axis)
-            now%m(l, 3) = form%sign3*now%m(l, 3)
-            now%q(l, :) = q
-            now%q(lanes + l, :) = q
+            state%m(l, :) = m(form%axis)
+            state%m(l, 3) = form%sign3*state%m(l, 3)
+            state%q(l, :) = q
+            state%q(lanes + l, :) = q
         end do
     end subroutine kick_and_drift_exactly
 

@@ -1,0 +1,111 @@
+!> How long the steps of `extrapolate` are: see frb_extrapolation.
+module frb_extrapolation_control
+    use frb_extrapolation_sets, only: powers, reaches
+    use frb_extrapolation_step, only: extrapolated_body, ask_torque, accept_step
+    use frb_kinds, only: wp
+    use frb_rotations, only: norm3
+    use frb_status, only: status_ok
+    use frb_torque, only: body_scene
+    use, intrinsic :: iso_fortran_env, only: int64
+    implicit none
+    private
+
+    public :: first_step, without_sliver, series_reach, within_reach, first_terms_do
+
+contains
+
+    !> The first step to be tried, by the torque at the start or, where a body feels none there, by that where
+    !> the free body will be after half a radian.
+    function first_step(moved, scene, t, left, tolerance, asked) result(h)
+        type(extrapolated_body), intent(in) :: moved
+        class(body_scene), intent(inout) :: scene
+        real(wp), intent(in) :: t, left
+        real(wp), intent(in) :: tolerance
+        integer(int64), intent(inout) :: asked          !! attitudes at which the torque was asked for
+        real(wp) :: h
+        type(extrapolated_body) :: ahead
+        real(wp) :: rate
+        integer :: code
+
+        ahead = moved
+        if (.not. maxval(abs(ahead%tau)) > 0.0_wp) then
+            h = left/2
+            rate = norm3(moved%core%a*moved%x(moved%core%order))
+            if (rate > 1/abs(left)) h = sign(0.5_wp/rate, left)
+            ahead%is_free = .true.
+            call accept_step(ahead, h, code)
+            ! What it refuses there, it refuses when a step gets there.
+            if (code == status_ok) call ask_torque(ahead, scene, t + h, asked, code)
+        end if
+        h = step_for(moved, ahead%tau, tolerance)
+    end function first_step
+
+    !> The step h, or one that divides what is left, if that is not much longer; a little longer than h if
+    !> that saves one.
+    pure function without_sliver(h, left) result(chosen)
+        real(wp), intent(in) :: h, left
+        real(wp) :: chosen
+
+        chosen = h
+        if (h < left .and. h > 0.3_wp*left) chosen = left/ceiling(0.92_wp*(left/h))
+    end function without_sliver
+
+    !> The step whose error is about the tolerance under a torque: the error of a step is some
+    !> constant (|n|/Omega) h (Omega h)^(power - 1), n the angular acceleration by the torque, Omega the
+    !> largest rate.
+    pure function step_for(moved, torque, tolerance) result(h)
+        type(extrapolated_body), intent(in) :: moved
+        real(wp), intent(in) :: torque(3), tolerance
+        real(wp) :: h
+        real(wp), parameter :: constants(*) = [1.6e-11_wp, 1.6e-11_wp, 2.5e-8_wp]
+        real(wp) :: acceleration, rate
+
+        acceleration = norm3(moved%core%a*torque(moved%core%order))
+        h = huge(h)
+        if (.not. acceleration > 0.0_wp) return
+        rate = max(norm3(moved%core%a*moved%x(moved%core%order)), sqrt(acceleration))
+        h = exp((log(tolerance/constants(moved%set)) - log(acceleration) &
+                 - (powers(moved%set) - 2)*log(rate))/powers(moved%set))
+    end function step_for
+
+    !> How long a step may be for the series of the lanes: the half angle of its shortest drifts is then below
+    !> 0.5.
+    pure function series_reach(moved) result(h)
+        type(extrapolated_body), intent(in) :: moved
+        real(wp) :: h
+        real(wp), parameter :: longest = 1.0e300_wp
+        real(wp) :: rate
+
+        h = longest
+        rate = moved%core%a(1)*norm3(moved%x(1:3))
+        if (rate > 8/longest) h = reaches(moved%set)/rate
+    end function series_reach
+
+    !> Whether the first terms of the series do for a step, part of their reach: what is left out then changes
+    !> it by less than its own error does, as measured on tops. Under a strong torque that error is larger.
+    pure function first_terms_do(moved, part, angle) result(do_it)
+        type(extrapolated_body), intent(in) :: moved
+        real(wp), intent(in) :: part
+        real(wp), intent(in) :: angle       !! largest turn in such a step, for the tolerance
+        logical :: do_it
+        real(wp), parameter :: strong = 0.01_wp, longer = 1.4_wp, longest = 4.0_wp
+        real(wp) :: turn, acceleration
+
+        turn = part*reaches(moved%set)
+        do_it = turn < min(angle, 3.0_wp)
+        if (do_it .or. turn > min(longer*angle, longest)) return
+        acceleration = maxval(abs(moved%core%a*moved%tau(moved%core%order)))
+        do_it = acceleration > strong*(moved%core%a(1)*norm3(moved%x(1:3)))**2
+    end function first_terms_do
+
+    !> The step h, or that of the series if it is not much shorter: the free flow takes some four times as
+    !> long as they do.
+    pure function within_reach(reach, h) result(chosen)
+        real(wp), intent(in) :: reach, h
+        real(wp) :: chosen
+
+        chosen = h
+        if (h > reach .and. h < 5*reach) chosen = reach
+    end function within_reach
+
+end module frb_extrapolation_control
