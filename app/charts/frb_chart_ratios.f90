@@ -14,9 +14,9 @@ module frb_chart_ratios
     integer, parameter :: durations(2) = [10, 100]
     real(wp), parameter :: errors_wanted(3) = [1.0e-6_wp, 1.0e-9_wp, 1.0e-12_wp]
     integer, parameter :: count_of_settings = 65
-    type(solver), parameter :: solvers(7) = [solver('extrapolate'), solver('scalar torque'), &
+    type(solver), parameter :: solvers(8) = [solver('extrapolate'), solver('scalar torque'), &
         solver('dop853'), solver('srkn14', 'flow'), solver('fg6a', 'flow'), solver('aba864', 'flow'), &
-        solver('fg6b', 'flow')]
+        solver('fg6b', 'flow'), solver('fg8', 'flow')]
     integer, parameter :: extrapolated = 1, scalar = 2, dop853 = 3, srkn14 = 4, fg6a = 5, aba864 = 6, fg6b = 7
 
 contains
@@ -28,7 +28,7 @@ contains
 
         call open_table(options, 'heavy-top-ratios', 'heavy tops to an error of the attitude at T; '// &
             'splittings with joined drifts', 'top, T, error; time [us] of extrapolate, of the same with '// &
-            'a scalar torque only, dop853, srkn14, fg6a, aba864, fg6b; ratios extrapolate/dop853, '// &
+            'a scalar torque only, dop853, srkn14, fg6a, aba864, fg6b, fg8; ratios extrapolate/dop853, '// &
             'scalar/dop853, fg6a/srkn14, fg6b/aba864', file)
         do number = 1, 2
             do i = 1, size(durations)
@@ -104,7 +104,7 @@ contains
         integer :: i
 
         us = [(1.0e6_wp*time_to(wanted, errors(:, i), times(:, i)), i=1, size(solvers))]
-        write (file%line, '(a8,i5,es8.0,7f9.2,4f7.2)') top%name, span, wanted, us, &
+        write (file%line, '(a8,i5,es8.0,8f9.2,4f7.2)') top%name, span, wanted, us, &
             us(extrapolated)/us(dop853), us(scalar)/us(dop853), us(fg6a)/us(srkn14), us(fg6b)/us(aba864)
         call file%put()
     end subroutine row

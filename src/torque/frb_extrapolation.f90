@@ -48,8 +48,8 @@ module frb_extrapolation
     !> Hairer-Vilmart top 1e-10 gives 5e-10 at T = 10 and 2e-8 at T = 100.
     !>
     !> A body that feels no torque is moved by the free flow, in one step, exactly. (A torque that is zero at
-    !> 36 times of a step and shorter than the gaps goes unseen: then bound the step by `step`.) A torque that
-    !> is switched on or off at some time is found by ever shorter steps.
+    !> the times of a step, 22 to 36, and shorter than the gaps goes unseen: then bound the step by `step`.)
+    !> A torque that is switched on or off at some time is found by ever shorter steps.
     !>
     !> `step` > 0 switches the adaptation off: equal steps of at most this size, the tolerance choosing the
     !> sequences. `observer` sees the start and every step. `compensated`, the default, carries the rounding
@@ -57,7 +57,8 @@ module frb_extrapolation
     !> call again with `t`.
     !>
     !> The scene's `torque_lanes` is asked for eight attitudes and times at once, the last four the first
-    !> four again; 36 different ones a step and one by `torque`. By default that is `torque` four times.
+    !> four again; 22 to 36 different ones a step, one of them by `torque`. By default that is `torque` four
+    !> times.
     !>
     !> When to take what: see frb_splitting. This is not symplectic and not reversible: the energy drifts by
     !> the error of the steps, which can be held near rounding up to T = 1e5 or so.

@@ -84,6 +84,16 @@ contains
         character(*), intent(in) :: name
         integer, intent(in), optional :: displaced      !! see scheme_from_coefficients
         type(splitting_scheme) :: scheme
+
+        scheme = scheme_of_plain_kicks(name)
+        if (scheme%status /= status_ok) scheme = scheme_of_modified_kicks(name)
+        scheme%name = name
+        call set_displaced(scheme, displaced)
+    end function scheme_by_name
+
+    pure function scheme_of_plain_kicks(name) result(scheme)
+        character(*), intent(in) :: name
+        type(splitting_scheme) :: scheme
         real(wp), parameter :: outer = 1/(2 - 2.0_wp**(1/3.0_wp))
 
         select case (name)
@@ -135,6 +145,16 @@ contains
                             [0.09585888083707521061077150377145884776921_wp, &
                              0.2044461531429987806805077839164344779763_wp, &
                              0.2170703479789911017143385924306336714532_wp], drift_first=.true.)
+        case default
+            scheme%status = status_bad_option
+        end select
+    end function scheme_of_plain_kicks
+
+    pure function scheme_of_modified_kicks(name) result(scheme)
+        character(*), intent(in) :: name
+        type(splitting_scheme) :: scheme
+
+        select case (name)
         case ('fg4')
             scheme = closed([0.1921125277429464_wp], &
                             [0.05851872613455621_wp, 0.28521622406870908761513176030422_wp], &
@@ -169,9 +189,7 @@ contains
         case default
             scheme%status = status_bad_option
         end select
-        scheme%name = name
-        call set_displaced(scheme, displaced)
-    end function scheme_by_name
+    end function scheme_of_modified_kicks
 
     !> A scheme from all coefficients of one step, in the order of use: one more drift than kicks (ABA) or one
     !> more kick than drifts (BAB). `mirrored` writes out a palindrome given up to its centre.
