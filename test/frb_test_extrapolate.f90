@@ -40,7 +40,7 @@ contains
         type(top_case) :: item
         type(extrapolation_report) :: report
         real(wp) :: m(3), q(4), error(2), seen, m_ref(3), q_ref(4), h
-        integer, parameter :: steps(2, 4) = reshape([15, 23, 12, 18, 26, 34, 16, 24], [2, 4])
+        integer, parameter :: steps(2, 4) = reshape([15, 23, 12, 18, 26, 34, 16, 36], [2, 4])
         integer, parameter :: tops(4) = [2, 2, 3, 2]
         ! The tolerance chooses the sequences: the first time those for the last digits.
         real(wp), parameter :: tolerances(4) = [0.0_wp, 1.0e-9_wp, 1.0e-9_wp, 1.0e-4_wp]

@@ -16,10 +16,11 @@ module frb_test_extrapolate_torques
 
     public :: test_extrapolate_torques
 
-    !> A heavy top with a scalar torque alone, which may refuse with a code of its own from some time on.
+    !> A heavy top with a scalar torque alone, which may begin at some time, and refuse with a code of its own
+    !> from some time on.
     type, extends(body_scene) :: scalar_top
         type(heavy_top) :: top
-        real(wp) :: until = huge(1.0_wp)
+        real(wp) :: from = -huge(1.0_wp), until = huge(1.0_wp)
         integer :: refusal = 0
         integer :: asked = 0
     contains
@@ -53,7 +54,7 @@ contains
     subroutine test_extrapolate_torques(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('extrapolate-torques', 50)
+        call t%open_suite('extrapolate-torques', 51)
         call test_values(t)
         call test_torques(t)
         call test_axes(t)
@@ -105,7 +106,7 @@ contains
         type(switched_torque) :: switch
         type(noisy_torque) :: noisy
         type(turning_force) :: turning
-        type(scalar_top) :: refusing
+        type(scalar_top) :: refusing, late
         type(rigid_body) :: body
         type(extrapolation_report) :: report
         real(wp) :: m(3), q(4), m_ref(3), q_ref(4), time, angle, error(2), seen
@@ -150,6 +151,12 @@ contains
                                 [cos(angle/2), 0.0_wp, 0.0_wp, sin(angle/2)]), 1.0e-8_wp)
         call t%ok('a-torque-that-is-switched-on-costs-some-steps', stat == status_ok &
                   .and. report%steps + report%rejected < 200)
+        late%top = item%top
+        late%from = 5.0_wp
+        m = item%m0
+        q = item%q0
+        call extrapolate(item%body, late, 1.0e4_wp, m, q, 1.0e-9_wp, stat=stat)
+        call t%equal('a-torque-that-begins-late-is-not-too-rough', stat, status_ok)
 
         spoilt%until = 0.7_wp
         m = [1.0_wp, 0.5_wp, 0.2_wp]
@@ -238,6 +245,7 @@ contains
 
         self%asked = self%asked + 1
         call self%top%torque(q, t, tau, stat)
+        if (t < self%from) tau = 0.0_wp
         if (t > self%until) stat = self%refusal
     end subroutine scalar_torque
 

@@ -58,14 +58,16 @@ contains
         real(wp), intent(in) :: torque(3), tolerance
         real(wp) :: h
         real(wp), parameter :: constants(*) = [1.6e-11_wp, 1.6e-11_wp, 2.5e-8_wp]
-        real(wp) :: acceleration, rate
+        real(wp), parameter :: least = 1.0e-100_wp
+        real(wp) :: acceleration, rate, ratio
 
         acceleration = norm3(moved%core%a*torque(moved%core%order))
         h = huge(h)
         if (.not. acceleration > 0.0_wp) return
         rate = max(norm3(moved%core%a*moved%x(moved%core%order)), sqrt(acceleration))
-        h = exp((log(tolerance/constants(moved%set)) - log(acceleration) &
-                 - (powers(moved%set) - 2)*log(rate))/powers(moved%set))
+        ! rate^2/acceleration, kept from overflow.
+        ratio = min(rate, 1/least)*(rate/max(acceleration, least*rate))
+        h = (tolerance/constants(moved%set)*ratio)**(1.0_wp/powers(moved%set))/rate
     end function step_for
 
     !> How long a step may be for the series of the lanes: the half angle of its shortest drifts is then below
