@@ -263,7 +263,8 @@ contains
             t_now = merge(start + time, start + (time - left), last)
             call note_step(told, h, moved%error, last)
             ! The guess says nothing where there was no torque at first.
-            short_steps = merge(short_steps + 1, 0, h < 1.0e-6_wp*min(guess, reach) .and. .not. fixed > 0.0_wp)
+            short_steps = merge(short_steps + 1, 0, h < 1.0e-6_wp*min(guess, reach) &
+                                .and. .not. fixed > 0.0_wp)
             if (code == status_ok .and. short_steps > 10000) code = status_too_rough
             if (code == status_ok .and. present(observer)) then
                 call show(moved, scene, told%steps, t_now, observer, code)

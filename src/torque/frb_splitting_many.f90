@@ -288,19 +288,6 @@ contains
         end if
     end subroutine go_back
 
-    subroutine show(run, step, t, code)
-        type(moving), intent(inout) :: run
-        integer(int64), intent(in) :: step
-        real(wp), intent(in) :: t
-        integer, intent(out) :: code
-        logical :: stop_here
-
-        stop_here = .false.
-        call run%observer%observe(step, t, run%m, run%q, stop_here)
-        code = merge(status_stopped, status_ok, stop_here)
-        call run%scene%agree(code)
-    end subroutine show
-
     !> Sizes and values of the state of a group.
     pure function check_group(bodies, m, q, rests) result(code)
         integer, intent(in) :: bodies

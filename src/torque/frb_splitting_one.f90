@@ -241,17 +241,4 @@ contains
         run%q_rest = run%kept(11:14)
     end subroutine go_back
 
-    subroutine show(run, step, t, code)
-        type(moving), intent(inout) :: run
-        integer(int64), intent(in) :: step
-        real(wp), intent(in) :: t
-        integer, intent(out) :: code
-        logical :: stop_here
-
-        stop_here = .false.
-        call run%observer%observe(step, t, run%m, run%q, stop_here)
-        code = merge(status_stopped, status_ok, stop_here)
-        call run%scene%agree(code)
-    end subroutine show
-
 end module frb_splitting_one
