@@ -33,7 +33,7 @@ contains
     end subroutine test_flow_accuracy
 
     !> Where the paper's steps are at their worst: next to axes, elongated, next to symmetric and to the
-    !> separatrix; and seven steps of one to fifty decay times that once had errors of 7 units and more.
+    !> separatrix; and seven steps of one to fifty decay times, where errors of 7 units are easily made.
     subroutine check_taylor(t)
         type(tally), intent(inout) :: t
         real(wp), parameter :: once(7, 7) = reshape([ &

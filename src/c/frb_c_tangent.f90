@@ -1,6 +1,6 @@
 !> The C interface to the derivative of the exact step, described in frb.h.
 module frb_c_tangent
-    use frb_c, only: find_state, quadruple, triple
+    use frb_c_memory, only: find_state, quadruple, triple
     use frb_free_flow, only: flow_tangent, rigid_body
     use frb_status, only: status_ok, status_bad_count
     use, intrinsic :: iso_c_binding, only: c_associated, c_double, c_f_pointer, c_int, c_ptr

@@ -1,6 +1,6 @@
 !> The C interface to runs under torque, described in frb.h: a heavy top, and a torque given as a C function.
 module frb_c_torque
-    use frb_c, only: find_state, quadruple, triple
+    use frb_c_memory, only: find_state, quadruple, triple
     use frb_free_flow, only: rigid_body
     use frb_kinds, only: wp
     use frb_scenes, only: heavy_top
