@@ -10,10 +10,9 @@
 !> frb_extrapolation_sets.
 module frb_extrapolation
     use frb_extrapolation_control, only: first_step, without_sliver, series_reach, within_reach, &
-        first_terms_do
+        first_terms_do, step_factor
     use frb_extrapolation_step, only: extrapolated_body, new_extrapolated_body, ask_torque, try_step, &
         accept_step, rounding
-    use frb_extrapolation_sets, only: powers
     use frb_free_flow, only: core_of, rigid_body
     use frb_kinds, only: wp
     use frb_rotations, only: is_unit_quat, quat_conjugate, quat_product, quat_rotate
@@ -211,7 +210,7 @@ contains
         type(extrapolation_report), intent(inout) :: told
         integer, intent(out) :: code
         class(body_observer), intent(inout), optional :: observer
-        real(wp) :: start, left, h, least, guess, ratio, factor, before, reach, few_angle
+        real(wp) :: start, left, h, least, guess, ratio, before, reach, few_angle
         integer :: short_steps, refused
         logical :: accepted, last
 
@@ -249,12 +248,9 @@ contains
             if (code == status_ok .and. accepted .and. .not. moved%is_finite) code = status_bad_torque
             call scene%agree(code)
             if (code /= status_ok) exit
-            ! 0.77: the estimate changes by a factor of ten from step to step where the torque is strong, and
-            ! a step in vain costs as much as any other.
-            factor = 0.77_wp*max(ratio, 1.0e-9_wp)**(-1.0_wp/powers(moved%set))
             if (.not. accepted) then
                 told%rejected = told%rejected + 1
-                h = h*max(0.2_wp, min(factor, 0.9_wp))
+                h = h*max(0.2_wp, min(step_factor(ratio, moved%set), 0.9_wp))
                 before = min(before, h)
                 cycle
             end if
@@ -269,7 +265,8 @@ contains
             if (code == status_ok .and. present(observer)) then
                 call show(moved, scene, told%steps, t_now, observer, code)
             end if
-            h = h*min(factor, 4.0_wp)
+            if (last) exit
+            h = h*min(step_factor(ratio, moved%set), 4.0_wp)
             ! The mean, on a logarithmic scale, of this and what was to follow the step before: it follows
             ! less what the estimate does from step to step, which saves 8 % of the steps.
             if (before > 0.0_wp) h = sqrt(h)*sqrt(before)

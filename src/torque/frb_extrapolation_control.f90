@@ -10,7 +10,8 @@ module frb_extrapolation_control
     implicit none
     private
 
-    public :: first_step, without_sliver, series_reach, within_reach, first_terms_do
+    public :: first_step, without_sliver, series_reach, within_reach, first_terms_do, &
+        step_factor
 
 contains
 
@@ -23,22 +24,34 @@ contains
         real(wp), intent(in) :: tolerance
         integer(int64), intent(inout) :: asked          !! attitudes at which the torque was asked for
         real(wp) :: h
+
+        if (maxval(abs(moved%tau)) > 0.0_wp) then
+            h = step_for(moved, moved%tau, tolerance)
+        else
+            h = step_for(moved, torque_ahead(moved, scene, t, left, asked), tolerance)
+        end if
+    end function first_step
+
+    function torque_ahead(moved, scene, t, left, asked) result(torque)
+        type(extrapolated_body), intent(in) :: moved
+        class(body_scene), intent(inout) :: scene
+        real(wp), intent(in) :: t, left
+        integer(int64), intent(inout) :: asked
+        real(wp) :: torque(3)
         type(extrapolated_body) :: ahead
-        real(wp) :: rate
+        real(wp) :: h, rate
         integer :: code
 
         ahead = moved
-        if (.not. maxval(abs(ahead%tau)) > 0.0_wp) then
-            h = left/2
-            rate = norm3(moved%core%a*moved%x(moved%core%order))
-            if (rate > 1/abs(left)) h = sign(0.5_wp/rate, left)
-            ahead%is_free = .true.
-            call accept_step(ahead, h, code)
-            ! What it refuses there, it refuses when a step gets there.
-            if (code == status_ok) call ask_torque(ahead, scene, t + h, asked, code)
-        end if
-        h = step_for(moved, ahead%tau, tolerance)
-    end function first_step
+        h = left/2
+        rate = norm3(moved%core%a*moved%x(moved%core%order))
+        if (rate > 1/abs(left)) h = sign(0.5_wp/rate, left)
+        ahead%is_free = .true.
+        call accept_step(ahead, h, code)
+        ! What it refuses there, it refuses when a step gets there.
+        if (code == status_ok) call ask_torque(ahead, scene, t + h, asked, code)
+        torque = ahead%tau
+    end function torque_ahead
 
     !> The step h, or one that divides what is left, if that is not much longer; a little longer than h if
     !> that saves one.
@@ -109,5 +122,16 @@ contains
         chosen = h
         if (h > reach .and. h < 5*reach) chosen = reach
     end function within_reach
+
+    !> By how much longer the next step should be than one whose error is `ratio` times the tolerance.
+    !> 0.77: the estimate changes by a factor of ten from step to step where the torque is strong, and a step
+    !> in vain costs as much as any other.
+    pure function step_factor(ratio, set) result(factor)
+        real(wp), intent(in) :: ratio
+        integer, intent(in) :: set      !! of sequences
+        real(wp) :: factor
+
+        factor = 0.77_wp*max(ratio, 1.0e-9_wp)**(-1.0_wp/powers(set))
+    end function step_factor
 
 end module frb_extrapolation_control

@@ -19,10 +19,11 @@
 !>
 !> | top | extrapolate | fg6a | fg6b | fg8 | srkn14 | aba864 | DOP853 on m and q |
 !> |-----|-------------|------|------|-----|--------|--------|-------------------|
-!> | Hairer-Vilmart, strong torque | 186 | 756 | 941 | 695 | 775 | 849 | 390 |
-!> | the paper's, weak torque | 21 | 80 | 49 | 86 | 78 | 55 | 63 |
+!> | Hairer-Vilmart, strong torque | 180 | 600 | 840 | 620 | 740 | 810 | 380 |
+!> | the paper's, weak torque | 18 | 69 | 46 | 76 | 78 | 55 | 64 |
 !>
-!> The chart program's `heavy-top` makes the pictures, for T = 10 and 10 000 too.
+!> The chart program's `ratios` makes this table, for other errors too, splittings with `joined` drifts;
+!> `heavy-top` makes the pictures, for T = 10 and 10 000 too.
 module frb_splitting
     use frb_free_flow, only: rigid_body
     use frb_kinds, only: wp
