@@ -28,7 +28,8 @@ contains
         type(step_parts), intent(inout), optional :: parts  !! for derivatives by the inertia
         type(step_parts) :: f
         real(wp) :: x, v, x1, x2, x3, v1, v2, v3, over_w, over_gg, twice, k, psi
-        real(wp) :: r11, r12, r13, r22, r23, r33, j11, j12, j13, j21, j22, j23, j31, j32, j33
+        real(wp) :: r11, r12, r13, r22, r23, r33, w11, w12, w13, w21, w22, w23, w31, w32, w33
+        real(wp) :: e11, e12, e13, e21, e22, e23, e31, e32, e33
         integer :: reach
 
         call set_form(body, t, m, f, reach)
@@ -38,7 +39,8 @@ contains
         call advance_momentum(f, m)
         call short_gradients(f%a, f%b, f%g, f%m1, f%m2, f%m3, f%gg, f%p, f%r, f%nu, f%y, f%scd, f%aa, f%bb, &
                              x, v, x1, x2, x3, v1, v2, v3, over_w, over_gg)
-        call advance_attitude(f, reach, q, twice, transition)
+        call advance_attitude(f, reach, q, twice, e11, e12, e13, e21, e22, e23, e31, e32, e33)
+        call put(f%o1, f%o2, f%o3, 6, 21, e11, e12, e13, e21, e22, e23, e31, e32, e33, transition)
         call turn_matrix(1.0_wp, x, v, twice, r11, r12, r13, r22, r23, r33)
         x1 = twice*x1
         x2 = twice*x2
@@ -46,19 +48,36 @@ contains
         v1 = twice*v1
         v2 = twice*v2
         v3 = twice*v3
-        call tangent_of_momentum(1.0_wp, x, v, r11, r12, r13, r22, r23, r33, x1, x2, x3, v1, v2, v3, f%e1, &
-                                 f%e2, f%e3, j11, j12, j13, j21, j22, j23, j31, j32, j33)
-        call put(f%o1, f%o2, f%o3, 6, 0, j11, j12, j13, j21, j22, j23, j31, j32, j33, transition)
         psi = -2*(f%b*f%g)*((f%dd + (1 - f%r*f%y)*f%bb)*over_w)
         k = 2*((f%rate - f%along*f%cosine) - (f%b*f%nu)*((1 - f%p*f%y)*f%aa*over_w))*over_gg
         call tangent_of_attitude(f%side, 1.0_wp, x, v, r11, r12, r13, r22, r23, r33, x1, x2, x3, v1, v2, v3, &
                                  f%e1, f%e2, f%e3, f%m1, f%m2, f%m3, 2*f%along*f%cosine, 2*f%along*f%along, &
                                  k*f%m1, (k + psi*f%g)*f%m2, (k + psi*f%b)*f%m3, &
-                                 j11, j12, j13, j21, j22, j23, j31, j32, j33)
-        call put(f%o1, f%o2, f%o3, 6, 3, j11, j12, j13, j21, j22, j23, j31, j32, j33, transition)
+                                 w11, w12, w13, w21, w22, w23, w31, w32, w33)
+        call put(f%o1, f%o2, f%o3, 6, 3, w11, w12, w13, w21, w22, w23, w31, w32, w33, transition)
+        if (reach <= short_step) then
+            ! J = E + m'^ W, which keeps all digits where the angle is small.
+            call add_moment(f%side*f%e1, f%side*f%e2, f%side*f%e3, w11, w21, w31, e11, e21, e31)
+            call add_moment(f%side*f%e1, f%side*f%e2, f%side*f%e3, w12, w22, w32, e12, e22, e32)
+            call add_moment(f%side*f%e1, f%side*f%e2, f%side*f%e3, w13, w23, w33, e13, e23, e33)
+        else
+            call tangent_of_momentum(1.0_wp, x, v, r11, r12, r13, r22, r23, r33, x1, x2, x3, v1, v2, v3, &
+                                     f%e1, f%e2, f%e3, e11, e12, e13, e21, e22, e23, e31, e32, e33)
+        end if
+        call put(f%o1, f%o2, f%o3, 6, 0, e11, e12, e13, e21, e22, e23, e31, e32, e33, transition)
         transition(1:3, 4:6) = 0.0_wp
         if (present(parts)) call describe(f, parts)
     end subroutine short_tangent
+
+    !> x <- x + m x w, columns of three.
+    pure subroutine add_moment(m1, m2, m3, w1, w2, w3, x1, x2, x3)
+        real(wp), intent(in) :: m1, m2, m3, w1, w2, w3
+        real(wp), intent(inout) :: x1, x2, x3
+
+        x1 = x1 + (m2*w3 - m3*w2)
+        x2 = x2 + (m3*w1 - m1*w3)
+        x3 = x3 + (m1*w2 - m2*w1)
+    end subroutine add_moment
 
     !> The constants of the motion, in the form with the smaller nu unless the series do not reach so far.
     pure subroutine set_form(body, t, m, f, reach)
@@ -127,15 +146,14 @@ contains
         m(f%o3) = f%s3*f%e3
     end subroutine advance_momentum
 
-    !> q at the end of the step, E in `transition`, and 2/(1 + x^2 + v^2).
-    pure subroutine advance_attitude(f, reach, q, twice, transition)
+    !> q at the end of the step, E, and 2/(1 + x^2 + v^2).
+    pure subroutine advance_attitude(f, reach, q, twice, e11, e12, e13, e21, e22, e23, e31, e32, e33)
         type(step_parts), intent(inout) :: f
         integer, intent(in) :: reach
         real(wp), intent(inout) :: q(4)
         real(wp), intent(out) :: twice
-        real(wp), intent(inout) :: transition(6, 6)
+        real(wp), intent(out) :: e11, e12, e13, e21, e22, e23, e31, e32, e33
         real(wp) :: angle, cosm1, v0, v2, v3, square, change, w0, w1, w2, w3, q1, q2, q3, k, z0
-        real(wp) :: e11, e12, e13, e21, e22, e23, e31, e32, e33
 
         angle = f%rate - f%b*f%nu*f%third
         square = angle*angle*f%gg
@@ -173,7 +191,6 @@ contains
         q(1 + f%o2) = f%side*q2
         q(1 + f%o3) = (f%side*f%s3)*q3
         call small_turn_matrix(w0, w1, w2, w3, e11, e12, e13, e21, e22, e23, e31, e32, e33)
-        call put(f%o1, f%o2, f%o3, 6, 21, e11, e12, e13, e21, e22, e23, e31, e32, e33, transition)
     end subroutine advance_attitude
 
     !> What the derivatives by the inertia want besides.
