@@ -1,5 +1,5 @@
 !> free_flow: refused input leaves the state untouched, in batches only that of the refused bodies; results
-!> of a batch do not depend on how it is split.
+!> of a batch do not depend on how it is split into parts of 7 bodies or more.
 module frb_test_flow_batches
     use frb_checks, only: tally, largest
     use frb_flow_samples, only: stream, advanced, settled, same, no_rotation
@@ -24,11 +24,12 @@ contains
     subroutine test_flow_batches(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('flow-batches', 29)
+        call t%open_suite('flow-batches', 30)
         call check_refused(t)
         call check_refused_in_batches(t)
         call check_counts(t)
         call check_splits(t)
+        call check_few(t)
         call t%close_suite()
     end subroutine test_flow_batches
 
@@ -247,11 +248,12 @@ contains
     end subroutine check_counts
 
     !> 2000 bodies, short and long steps, extreme numbers, tensors, bad ones, symmetric ones mixed: the same
-    !> bits in one call and in any split, for equal and different bodies, with and without attitude.
+    !> bits in one call and in parts of 7 bodies or more, for equal and different bodies, with and without
+    !> attitude.
     subroutine check_splits(t)
         type(tally), intent(inout) :: t
         integer, parameter :: n = 2000     ! enough for threads to share, in a build with OpenMP
-        integer, parameter :: splits(6) = [1, 7, 24, 32, 37, 500]
+        integer, parameter :: splits(6) = [7, 23, 32, 40, 97, 500]     ! the last part is joined to the one before
         type(stream) :: random
         type(rigid_body), allocatable :: bodies(:)
         real(wp), allocatable :: m_in(:, :), q_in(:, :), m1(:, :), q1(:, :), m2(:, :), q2(:, :), m3(:, :)
@@ -298,8 +300,8 @@ contains
             do j = 1, size(splits)
                 m2 = m_in
                 q2 = q_in
-                do first = 1, n, splits(j)
-                    last = min(first + splits(j) - 1, n)
+                do first = 1, n - splits(j) + 1, splits(j)
+                    last = merge(n, first + splits(j) - 1, first + 2*splits(j) - 1 > n)
                     call free_flow(bodies(first:last), 3*10.0_wp**k, m2(:, first:last), q2(:, first:last), &
                                    stat)
                 end do
@@ -316,8 +318,8 @@ contains
             do j = 1, size(splits)
                 m2 = m_in
                 q2 = q_in
-                do first = 1, n, splits(j)
-                    last = min(first + splits(j) - 1, n)
+                do first = 1, n - splits(j) + 1, splits(j)
+                    last = merge(n, first + splits(j) - 1, first + 2*splits(j) - 1 > n)
                     call free_flow(bodies(1), 3*10.0_wp**k, m2(:, first:last), q2(:, first:last), stat)
                 end do
                 equal = equal .and. same([m2], [m1]) .and. same([q2], [q1])
@@ -336,12 +338,46 @@ contains
         call free_flow(bodies(1), 1.0e74_wp, m1, q1, stat)
         m2 = m_in
         q2 = q_in
-        do first = 1, n, 7
-            last = min(first + 6, n)
+        do first = 1, n - 6, 7
+            last = merge(n, first + 6, first + 13 > n)
             call free_flow(bodies(1), 1.0e74_wp, m2(:, first:last), q2(:, first:last), stat)
         end do
         call t%ok('smallest-numbers-give-the-same-bits-however-split', &
                   same([m2], [m1]) .and. same([q2], [q1]))
     end subroutine check_splits
+
+    !> Fewer bodies than a block is worth give the bits of one after another.
+    subroutine check_few(t)
+        type(tally), intent(inout) :: t
+        type(stream) :: random
+        type(rigid_body) :: bodies(6)
+        real(wp) :: m_in(3, 6), m(3, 6), q(4, 6), m1(3, 6), q1(4, 6), h
+        logical :: bits
+        integer :: i, j, k, n, stat
+
+        bits = .true.
+        do n = 1, 6
+            do k = -3, 2
+                h = 10.0_wp**k
+                do i = 1, n
+                    bodies(i) = rigid_body(random%triangle())
+                    m_in(:, i) = random%direction()
+                end do
+                do j = 1, 2
+                    m = m_in
+                    q = spread(q0, 2, 6)
+                    m1 = m_in
+                    q1 = q
+                    if (j == 1) call free_flow(bodies(:n), h, m(:, :n), q(:, :n), stat)
+                    if (j == 2) call free_flow(bodies(1), h, m(:, :n), q(:, :n), stat)
+                    do i = 1, n
+                        call free_flow(bodies(merge(i, 1, j == 1)), h, m1(:, i), q1(:, i), stat)
+                    end do
+                    bits = bits .and. same([m(:, :n)], [m1(:, :n)]) .and. same([q], [q1])
+                end do
+            end do
+        end do
+        call t%ok('few-bodies-give-the-bits-of-one-after-another', bits)
+    end subroutine check_few
 
 end module frb_test_flow_batches

@@ -1,7 +1,7 @@
 !> Blocks of bodies for frb_flow_lanes: constants of equal or different bodies, and the way of vectors from
 !> body axes to cyclic ones, the middle moment second, and back.
 module frb_flow_blocks
-    use frb_flow_lanes, only: lanes, vector, angle_as_reach, lane_bodies, workspace, step_cyclic
+    use frb_flow_lanes, only: lanes, vector, lane_bodies, workspace, step_cyclic
     use frb_flow_limits, only: plain_largest
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
@@ -10,7 +10,7 @@ module frb_flow_blocks
     implicit none
     private
 
-    public :: block_of_bodies, set_bodies, step_lanes
+    public :: block_of_bodies, set_bodies, step_lanes, whole
 
     integer, parameter :: same_axes = 1, shifted_axes = 2, turned_axes = 3
 
@@ -26,6 +26,14 @@ module frb_flow_blocks
 
 contains
 
+    !> `count` lanes filled to whole vectors: no loop has a rest.
+    pure function whole(count) result(full)
+        integer, intent(in) :: count
+        integer :: full
+
+        full = vector*((count + vector - 1)/vector)
+    end function whole
+
     !> The constants of `count` bodies from the first, each with its time; lanes up to a whole vector repeat
     !> the last one. Lanes that are not plain, those of refused bodies among them, have constants 0.
     pure subroutine set_bodies(body, bodies, h, times, first, count, block)
@@ -35,30 +43,32 @@ contains
         type(block_of_bodies), intent(inout) :: block
         real(wp) :: t(lanes), axis
         integer(int64) :: plain, turned, apart
-        integer :: l, full
+        integer :: l, full, given
 
-        full = min(lanes, vector*((count + vector - 1)/vector))
-        call gather(body, bodies, first, count, full, block)
+        full = whole(count)
+        given = merge(1, full, max(bodies, times) == 1)
+        call gather(body, bodies, first, count, given, block)
         if (times == 1) then
-            t(:full) = merge(0.5_wp*h(1), 0.0_wp, abs(h(1)) < plain_largest)
+            t(:given) = merge(0.5_wp*h(1), 0.0_wp, abs(h(1)) < plain_largest)
         else
             t(:count) = merge(h(first:first + count - 1), 0.0_wp, ieee_is_finite(h(first:first + count - 1)))
             t(count + 1:full) = t(count)
             ! A time of 0 goes on as one that is too large does: by itself.
             t(:full) = merge(0.5_wp*t(:full), 0.0_wp, abs(t(:full)) < plain_largest)
         end if
-        call scale_by_time(full, t, block%lane, block%of, plain)
-        block%all_plain = plain == full
+        call scale_by_time(given, t, block%lane, block%of, plain)
+        block%all_plain = plain == given
         turned = 0
         apart = 0
-        do l = 1, full
+        do l = 1, given
             axis = abs(block%lane(l))
             turned = turned + merge(1_int64, 0_int64, axis > 3.5_wp)
             apart = apart + merge(1_int64, 0_int64, abs(axis - abs(block%lane(1))) > 0.5_wp)
         end do
         block%axes_are = merge(same_axes, merge(shifted_axes, turned_axes, turned == 0), apart + turned == 0)
-        block%column = cshift([1, 2, 3], modulo(1 - int(abs(block%lane(1))), 3))
-        if (block%axes_are /= same_axes) block%column = [1, 2, 3]
+        block%column = [1, 2, 3]
+        if (block%axes_are == same_axes) block%column = 1 + modulo([4, 5, 6] - int(abs(block%lane(1))), 3)
+        if (given < full) call fill(full, block)
         if (block%axes_are /= turned_axes) return
         do l = 1, full
             associate (one => body(min(bodies, first + min(l, count) - 1)))
@@ -71,34 +81,95 @@ contains
         end do
     end subroutine set_bodies
 
-    !> Constants of bodies as columns.
-    pure subroutine gather(body, bodies, first, count, full, block)
-        integer, intent(in) :: bodies, first, count, full
+    !> Constants of bodies as columns, of `count` from the first or of the only one; the last is repeated to
+    !> `given`.
+    pure subroutine gather(body, bodies, first, count, given, block)
+        integer, intent(in) :: bodies, first, count, given
         type(body_core), intent(in) :: body(:)
         type(block_of_bodies), intent(inout) :: block
-        integer :: l, given, before
+        integer :: l
 
-        given = merge(1, count, bodies == 1)
-        before = merge(0, first - 1, bodies == 1)
         do l = 1, given
-            associate (one => body(before + l))
+            associate (one => body(min(bodies, first + min(l, count) - 1)))
                 block%lane(l) = one%lane
                 block%of%a(l) = one%alpha
                 block%of%b(l) = one%beta
                 block%of%g(l) = one%gamma
                 block%of%first(l) = one%a(1)
+                block%of%second(l) = one%a(2)
                 block%of%last(l) = one%a(3)
             end associate
         end do
-        do l = given + 1, full
-            block%lane(l) = block%lane(given)
-            block%of%a(l) = block%of%a(given)
-            block%of%b(l) = block%of%b(given)
-            block%of%g(l) = block%of%g(given)
-            block%of%first(l) = block%of%first(given)
-            block%of%last(l) = block%of%last(given)
-        end do
+        call polynomial_of_rho(given, block%of)
     end subroutine gather
+
+    !> The constants of the first lane in all others.
+    pure subroutine fill(full, block)
+        integer, intent(in) :: full
+        type(block_of_bodies), intent(inout) :: block
+        integer :: l, i
+
+        associate (of => block%of, lane => block%lane(1))
+            do l = 0, full - 1, vector
+                block%lane(l + 1:l + vector) = lane
+                of%a(l + 1:l + vector) = of%a(1)
+                of%b(l + 1:l + vector) = of%b(1)
+                of%g(l + 1:l + vector) = of%g(1)
+                of%ag(l + 1:l + vector) = of%ag(1)
+                of%ab(l + 1:l + vector) = of%ab(1)
+                of%bg(l + 1:l + vector) = of%bg(1)
+                of%first(l + 1:l + vector) = of%first(1)
+                of%second(l + 1:l + vector) = of%second(1)
+                of%last(l + 1:l + vector) = of%last(1)
+                of%rate(l + 1:l + vector) = of%rate(1)
+                do i = 1, size(of%rho, 2)
+                    of%rho(l + 1:l + vector, i) = of%rho(1, i)
+                end do
+            end do
+        end associate
+    end subroutine fill
+
+    !> The constant rho of frb_flow_lanes as a polynomial in u and e to degree 4: coefficients of u to u^4, then
+    !> of e, e u, e u^2, e u^3, of e^2 to e^2 u^2, of e^3, e^3 u and of e^4.
+    pure subroutine polynomial_of_rho(n, of)
+        integer, intent(in) :: n
+        type(lane_bodies), intent(inout) :: of
+        real(wp) :: a2, a3, s1, s2, s3, s11, s22, s33, s12, s23, s13
+        integer :: l
+
+        do l = 1, n
+            a3 = 1/max(of%first(l), tiny(1.0_wp))
+            a2 = of%second(l)*a3
+            a3 = of%last(l)*a3
+            s1 = 1 + a2 + a3
+            s2 = a2 + a3 + a2*a3
+            s3 = a2*a3
+            s11 = s1*s1
+            s22 = s2*s2
+            s33 = s3*s3
+            s12 = s1*s2
+            s23 = s2*s3
+            s13 = s1*s3
+            of%rho(l, 1) = -s3*(2/3.0_wp)
+            of%rho(l, 2) = s23*(7/45.0_wp)
+            of%rho(l, 3) = -(s13*s3*(4/105.0_wp) + s22*s3*(22/945.0_wp))
+            of%rho(l, 4) = s12*s33*(11/525.0_wp) + s22*s23*(1/675.0_wp) - s33*s3*(2/567.0_wp)
+            of%rho(l, 5) = s2*(1/3.0_wp)
+            of%rho(l, 6) = s13*(4/45.0_wp) - s22*(8/45.0_wp)
+            of%rho(l, 7) = s12*s3*(106/945.0_wp) + s2*s22*(4/189.0_wp) - s33*(64/315.0_wp)
+            of%rho(l, 8) = s2*s33*(268/4725.0_wp) - s13*s13*(8/525.0_wp) - s12*s23*(68/1575.0_wp) &
+                           - s22*s22*(8/4725.0_wp)
+            of%rho(l, 9) = s12*(7/45.0_wp) - s3*(2/5.0_wp)
+            of%rho(l, 10) = s23*(82/315.0_wp) - s11*s3*(52/945.0_wp) - s12*s2*(16/189.0_wp)
+            of%rho(l, 11) = s12*s13*(94/1575.0_wp) + s12*s22*(8/315.0_wp) - s13*s3*(4/105.0_wp) &
+                            - s22*s3*(431/4725.0_wp)
+            of%rho(l, 12) = s11*s2*(62/945.0_wp) - s13*(8/105.0_wp) - s22*(19/315.0_wp)
+            of%rho(l, 13) = s12*s3*(8/75.0_wp) + s2*s22*(472/14175.0_wp) - s11*s13*(8/675.0_wp) &
+                            - s12*s12*(16/315.0_wp) - s33*(16/175.0_wp)
+            of%rho(l, 14) = s11*s12*(127/4725.0_wp) - s11*s3*(22/525.0_wp) - s12*s2*(19/525.0_wp) &
+                            + s23*(31/525.0_wp)
+        end do
+    end subroutine polynomial_of_rho
 
     !> Times t, and with the axes in cyclic order, the middle moment second: of odd ones the first and the
     !> last change places. `plain` lanes turn by no angle near overflow; the others get 0.
@@ -121,10 +192,11 @@ contains
             plain = plain + merge(1_int64, 0_int64, abs(time) > 0)
             a1 = a1*time
             a3 = min(of%last(l), plain_largest)*time
+            of%second(l) = min(of%second(l), plain_largest)*time
             a = of%a(l)*time
             b = of%b(l)*time
             g = of%g(l)*time
-            of%turn(l) = angle_as_reach*a1**2
+            of%rate(l) = a1
             of%first(l) = merge(a3, a1, lane(l) < 0)
             of%last(l) = merge(a1, a3, lane(l) < 0)
             of%a(l) = merge(-g, a, lane(l) < 0)
@@ -138,27 +210,27 @@ contains
     end subroutine scale_by_time
 
     !> Vectors of n lanes from body axes to cyclic ones.
-    pure subroutine to_cyclic(n, block, x, v)
+    pure subroutine to_cyclic(n, block, u1, u2, u3, v)
         integer, intent(in) :: n
         type(block_of_bodies), intent(in) :: block
-        real(wp), intent(in) :: x(lanes, 3)
+        real(wp), intent(in) :: u1(n), u2(n), u3(n)
         real(wp), intent(out) :: v(lanes, 3)
         real(wp) :: x1, x2, x3, axis
         integer :: l
 
         do l = 1, merge(n, 0, block%axes_are == shifted_axes)
-            x1 = x(l, 1)
-            x2 = x(l, 2)
-            x3 = x(l, 3)
+            x1 = u1(l)
+            x2 = u2(l)
+            x3 = u3(l)
             axis = abs(block%lane(l))
             v(l, 1) = merge(x1, merge(x2, x3, axis < 2.5_wp), axis < 1.5_wp)
             v(l, 2) = merge(x2, merge(x3, x1, axis < 2.5_wp), axis < 1.5_wp)
             v(l, 3) = merge(x3, merge(x1, x2, axis < 2.5_wp), axis < 1.5_wp)
         end do
         do l = 1, merge(n, 0, block%axes_are == turned_axes)
-            x1 = x(l, 1)
-            x2 = x(l, 2)
-            x3 = x(l, 3)
+            x1 = u1(l)
+            x2 = u2(l)
+            x3 = u3(l)
             v(l, 1) = block%axes(l, 1, 1)*x1 + (block%axes(l, 2, 1)*x2 + block%axes(l, 3, 1)*x3)
             v(l, 2) = block%axes(l, 1, 2)*x1 + (block%axes(l, 2, 2)*x2 + block%axes(l, 3, 2)*x3)
             v(l, 3) = block%axes(l, 1, 3)*x1 + (block%axes(l, 2, 3)*x2 + block%axes(l, 3, 3)*x3)
@@ -192,24 +264,29 @@ contains
         end do
     end subroutine from_cyclic
 
-    !> The step of n lanes with momenta x, plain numbers, in columns as `block` has them: see step_cyclic.
-    pure subroutine step_lanes(n, with_attitude, block, x, work, all_served)
+    !> The step of n lanes with momenta (x1, x2, x3) in body axes, plain numbers: see step_cyclic. What comes
+    !> is in columns as `block` has them.
+    pure subroutine step_lanes(n, with_attitude, block, x1, x2, x3, work, all_served)
         integer, intent(in) :: n
         logical, intent(in) :: with_attitude
         type(block_of_bodies), intent(in) :: block
-        real(wp), intent(in) :: x(lanes, 3)
+        real(wp), intent(in) :: x1(n), x2(n), x3(n)
         type(workspace), intent(inout) :: work
         logical, intent(out) :: all_served
         real(wp) :: cyclic(lanes, 3)
 
         if (block%axes_are /= same_axes) then
-            call to_cyclic(n, block, x, cyclic)
+            call to_cyclic(n, block, x1, x2, x3, cyclic)
             call step_cyclic(n, with_attitude, block%of, cyclic(:, 1), cyclic(:, 2), cyclic(:, 3), work, &
                              all_served)
             call from_cyclic(n, block, work%d)
             if (with_attitude) call from_cyclic(n, block, work%w)
+        else if (block%column(1) == 1) then
+            call step_cyclic(n, with_attitude, block%of, x1, x2, x3, work, all_served)
+        else if (block%column(1) == 2) then
+            call step_cyclic(n, with_attitude, block%of, x3, x1, x2, work, all_served)
         else
-            call step_cyclic(n, with_attitude, block%of, x(:, 1), x(:, 2), x(:, 3), work, all_served)
+            call step_cyclic(n, with_attitude, block%of, x2, x3, x1, work, all_served)
         end if
     end subroutine step_lanes
 

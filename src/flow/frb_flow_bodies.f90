@@ -1,18 +1,24 @@
-!> Many free bodies at once: blocks of them through SIMD lanes, blocks through threads.
+!> Many free bodies at once: blocks of them through SIMD lanes, blocks through threads. States are columns
+!> there: those of rows are copied, those in columns are advanced where they are if they fill whole vectors.
 module frb_flow_bodies
-    use frb_flow_blocks, only: block_of_bodies, set_bodies, step_lanes
-    use frb_flow_lanes, only: lanes, vector, workspace, is_served
+    use frb_flow_blocks, only: block_of_bodies, set_bodies, step_lanes, whole
+    use frb_flow_lanes, only: lanes, workspace, is_served
     use frb_flow_limits, only: plain_largest, plain_smallest
     use frb_flow_one, only: flow_body
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
-    use frb_status, only: status_ok, status_bad_attitude, status_bad_time
+    use frb_status, only: status_ok, status_bad_time
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_is_nan
     use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
-    public :: flow_many, check_many, flow_rows, all_finite
+    public :: flow_many, flow_columns
+
+    !> As many take no longer in a block than one after another. Fewer go by flow_body; from here on what
+    !> becomes of a body does not depend on the others: the same bits for any threads and parts of a batch.
+    integer, parameter :: least = 7
+    logical, parameter :: none(least) = .false.
 
 contains
 
@@ -31,7 +37,18 @@ contains
         call check_many(body, bodies, h, times, code)
         if (code /= status_ok .or. n == 0) return
         refused = status_ok
-        call set_bodies(body, bodies, h, times, 1, min(n, lanes), block)
+        if (n < least) then
+            do first = 1, n
+                if (present(q)) then
+                    call flow_single(body, bodies, h, times, first, m(1, first), refused, q(1, first))
+                else
+                    call flow_single(body, bodies, h, times, first, m(1, first), refused)
+                end if
+            end do
+            code = refused
+            return
+        end if
+        if (max(bodies, times) == 1) call set_bodies(body, bodies, h, times, 1, min(n, lanes), block)
         !$omp parallel do if (n >= 64*lanes) firstprivate(block) private(count) reduction(max: refused)
         do first = 1, n, lanes
             count = min(lanes, n - first + 1)
@@ -46,6 +63,67 @@ contains
         code = refused
     end subroutine flow_many
 
+    !> The same with states in columns, q0 to q3 all or none: the same bits.
+    subroutine flow_columns(body, bodies, h, times, n, m1, m2, m3, code, q0, q1, q2, q3)
+        integer, intent(in) :: bodies, times, n     !! bodies and times: 1 or n
+        type(body_core), intent(in) :: body(:)
+        real(wp), intent(in) :: h(times)
+        real(wp), intent(inout) :: m1(n), m2(n), m3(n)
+        integer, intent(out) :: code
+        real(wp), intent(inout), optional :: q0(n), q1(n), q2(n), q3(n)
+        type(block_of_bodies) :: block
+        type(workspace) :: work
+        real(wp) :: x(lanes, 3), y(lanes, 4)
+        logical :: served
+        integer :: first, last, count, refused
+
+        call check_many(body, bodies, h, times, code)
+        if (code /= status_ok .or. n == 0) return
+        refused = status_ok
+        if (max(bodies, times) == 1) call set_bodies(body, bodies, h, times, 1, min(n, lanes), block)
+        !$omp parallel do if (n >= 64*lanes) firstprivate(block) private(last, count, served, x, y, work) &
+        !$omp& reduction(max: refused)
+        do first = 1, n, lanes
+            last = min(first + lanes - 1, n)
+            count = last - first + 1
+            if (max(bodies, times) > 1) call set_bodies(body, bodies, h, times, first, count, block)
+            served = .false.
+            if (block%all_plain .and. n >= least .and. count == whole(count)) then
+                if (present(q0)) then
+                    call flow_whole(count, block, .false., work, served, m1(first), m2(first), m3(first), &
+                                    q0(first), q1(first), q2(first), q3(first))
+                else
+                    call flow_whole(count, block, .false., work, served, m1(first), m2(first), m3(first))
+                end if
+            end if
+            if (served) cycle
+            x(:count, 1) = m1(first:last)
+            x(:count, 2) = m2(first:last)
+            x(:count, 3) = m3(first:last)
+            if (present(q0)) then
+                y(:count, 1) = q0(first:last)
+                y(:count, 2) = q1(first:last)
+                y(:count, 3) = q2(first:last)
+                y(:count, 4) = q3(first:last)
+            end if
+            if (n < least) then
+                call flow_rest(body, bodies, h, times, first, count, none, present(q0), x, y, refused)
+            else
+                call flow_block(body, bodies, h, times, first, count, block, present(q0), x, y, refused)
+            end if
+            m1(first:last) = x(:count, 1)
+            m2(first:last) = x(:count, 2)
+            m3(first:last) = x(:count, 3)
+            if (.not. present(q0)) cycle
+            q0(first:last) = y(:count, 1)
+            q1(first:last) = y(:count, 2)
+            q2(first:last) = y(:count, 3)
+            q3(first:last) = y(:count, 4)
+        end do
+        !$omp end parallel do
+        code = refused
+    end subroutine flow_columns
+
     !> Whether the only body or the only time is refused, and so all states are.
     pure subroutine check_many(body, bodies, h, times, code)
         integer, intent(in) :: bodies, times
@@ -59,7 +137,8 @@ contains
         if (.not. ieee_is_finite(h(1))) code = status_bad_time
     end subroutine check_many
 
-    !> One block: in place if all is plain and the lanes are whole vectors.
+    !> One block of rows. Storing four columns as rows by vectors takes longer than by numbers: GCC shuffles
+    !> each vector four times.
     subroutine flow_rows(body, bodies, h, times, first, count, block, m, refused, q)
         integer, intent(in) :: bodies, times, first, count
         type(body_core), intent(in) :: body(:)
@@ -68,185 +147,218 @@ contains
         real(wp), intent(inout) :: m(3, count)
         integer, intent(inout) :: refused
         real(wp), intent(inout), optional :: q(4, count)
-        type(workspace) :: work
-        real(wp) :: x(lanes, 3), copy_m(3, lanes), copy_q(4, lanes)
-        logical :: good(lanes), served
-        integer :: l, full, code
+        real(wp) :: x(lanes, 3), y(lanes, 4)
+        integer :: l
 
-        if (block%all_plain .and. mod(count, vector) == 0) then
-            call load_momenta(count, block, m, x, served)
-            if (served .and. present(q)) served = all_finite(4*count, q)
-            if (served) call step_lanes(count, present(q), block, x, work, served)
-            if (served) then
-                if (present(q)) call turn_attitudes(count, block, work, refused, q)
-                call store_momenta(count, block, work, x, m)
-                return
-            end if
-        end if
-        full = vector*((count + vector - 1)/vector)
         do l = 1, count
-            good(l) = abs(block%lane(l)) > 0.5_wp
-            if (good(l)) good(l) = is_plain(m(:, l))
-            if (good(l) .and. present(q)) good(l) = is_plain(q(:, l))
-            copy_m(:, l) = 0.0_wp
-            copy_q(:, l) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-            if (.not. good(l)) cycle
-            copy_m(:, l) = m(:, l)
-            if (present(q)) copy_q(:, l) = q(:, l)
+            x(l, 1) = m(1, l)
+            x(l, 2) = m(2, l)
+            x(l, 3) = m(3, l)
         end do
-        copy_m(:, count + 1:full) = spread(copy_m(:, count), 2, full - count)
-        copy_q(:, count + 1:full) = spread(copy_q(:, count), 2, full - count)
-        call load_momenta(full, block, copy_m, x, served)
-        call step_lanes(full, present(q), block, x, work, served)
-        if (present(q)) call turn_attitudes(full, block, work, refused, copy_q)
-        call store_momenta(full, block, work, x, copy_m)
+        if (present(q)) then
+            do l = 1, count
+                y(l, 1) = q(1, l)
+                y(l, 2) = q(2, l)
+                y(l, 3) = q(3, l)
+                y(l, 4) = q(4, l)
+            end do
+        end if
+        call flow_block(body, bodies, h, times, first, count, block, present(q), x, y, refused)
         do l = 1, count
-            code = status_ok
-            if (good(l) .and. is_served(work%reach(l))) then
-                m(:, l) = copy_m(:, l)
-                if (present(q)) q(:, l) = copy_q(:, l)
-            else
-                associate (one => body(min(bodies, first + l - 1)), time => h(min(times, first + l - 1)))
-                    if (present(q)) then
-                        call flow_body(one, time, m(:, l), code, q(:, l))
-                    else
-                        call flow_body(one, time, m(:, l), code)
-                    end if
-                end associate
-            end if
-            refused = max(refused, code)
+            m(1, l) = x(l, 1)
+            m(2, l) = x(l, 2)
+            m(3, l) = x(l, 3)
+        end do
+        if (.not. present(q)) return
+        !GCC$ novector
+        do l = 1, count
+            q(1, l) = y(l, 1)
+            q(2, l) = y(l, 2)
+            q(3, l) = y(l, 3)
+            q(4, l) = y(l, 4)
         end do
     end subroutine flow_rows
 
-    !> Whether components are finite, far from overflow and, in their sum, not below the smallest.
-    pure function is_plain(x) result(plain)
-        real(wp), intent(in) :: x(:)
-        logical :: plain
-
-        plain = all(ieee_is_finite(x))
-        if (plain) plain = all(abs(x) < plain_largest) .and. sum(abs(x)) >= plain_smallest
-    end function is_plain
-
-    !> Whether twice each number is finite.
-    pure function all_finite(n, x) result(finite)
-        integer, intent(in) :: n
-        real(wp), intent(in) :: x(n)
-        logical :: finite
-        integer(int64) :: many
-        integer :: l
-
-        many = 0
-        do l = 1, n
-            many = many + merge(1_int64, 0_int64, ieee_is_finite(2*x(l)))
-        end do
-        finite = many == n
-    end function all_finite
-
-    !> Momenta as columns, each in the place of its cyclic axis if all bodies have the same; whether all are
-    !> finite and far from overflow.
-    subroutine load_momenta(n, block, m, x, plain)
-        integer, intent(in) :: n
+    !> One block, its states in columns with room for whole vectors. What lanes cannot do goes by flow_body.
+    subroutine flow_block(body, bodies, h, times, first, count, block, with_attitude, x, y, refused)
+        integer, intent(in) :: bodies, times, first, count
+        type(body_core), intent(in) :: body(:)
+        real(wp), intent(in) :: h(times)
         type(block_of_bodies), intent(in) :: block
-        real(wp), intent(in) :: m(3, n)
-        real(wp), intent(inout) :: x(lanes, 3)
-        logical, intent(out) :: plain
-
-        call load(n, m, x(1, block%column(1)), x(1, block%column(2)), x(1, block%column(3)), plain)
-    end subroutine load_momenta
-
-    pure subroutine load(n, m, x1, x2, x3, plain)
-        integer, intent(in) :: n
-        real(wp), intent(in) :: m(3, n)
-        real(wp), intent(inout) :: x1(n), x2(n), x3(n)
-        logical, intent(out) :: plain
-        real(wp) :: m1, m2, m3, total
-        integer(int64) :: many
-        integer :: l
-
-        many = 0
-        do l = 1, n
-            m1 = m(1, l)
-            m2 = m(2, l)
-            m3 = m(3, l)
-            total = (0.25_wp*abs(m1) + 0.25_wp*abs(m2)) + 0.25_wp*abs(m3)       ! does not overflow
-            total = merge(plain_largest, total, ieee_is_nan(total))     ! comparing a NaN raises a flag
-            many = many + merge(1_int64, 0_int64, total < 0.25_wp*plain_largest)
-            x1(l) = m1
-            x2(l) = m2
-            x3(l) = m3
-        end do
-        plain = many == n
-    end subroutine load
-
-    !> Momenta and their increments together, back in the place of m.
-    subroutine store_momenta(n, block, work, x, m)
-        integer, intent(in) :: n
-        type(block_of_bodies), intent(in) :: block
-        type(workspace), intent(in) :: work
-        real(wp), intent(in) :: x(lanes, 3)
-        real(wp), intent(inout) :: m(3, n)
-
-        associate (c => block%column)
-            call store(n, x(1, c(1)), x(1, c(2)), x(1, c(3)), work%d(1, c(1)), work%d(1, c(2)), &
-                       work%d(1, c(3)), m)
-        end associate
-    end subroutine store_momenta
-
-    pure subroutine store(n, x1, x2, x3, d1, d2, d3, m)
-        integer, intent(in) :: n
-        real(wp), intent(in) :: x1(n), x2(n), x3(n), d1(n), d2(n), d3(n)
-        real(wp), intent(inout) :: m(3, n)
-        integer :: l
-
-        do l = 1, n
-            m(1, l) = x1(l) + d1(l)
-            m(2, l) = x2(l) + d2(l)
-            m(3, l) = x3(l) + d3(l)
-        end do
-    end subroutine store
-
-    !> q + q w. A body whose quaternion is zero is refused: it keeps its momentum too.
-    subroutine turn_attitudes(n, block, work, refused, q)
-        integer, intent(in) :: n
-        type(block_of_bodies), intent(in) :: block
-        type(workspace), intent(inout) :: work
+        logical, intent(in) :: with_attitude
+        real(wp), intent(inout) :: x(lanes, 3), y(lanes, 4)
         integer, intent(inout) :: refused
-        real(wp), intent(inout) :: q(4, n)
-        integer :: zeros, l
+        type(workspace) :: work
+        real(wp) :: new_x(lanes, 3), new_y(lanes, 4)
+        logical :: good(lanes), served
+        integer :: l, full
 
-        call turn_rows(n, work%w0, work%w(1, block%column(1)), work%w(1, block%column(2)), &
-                       work%w(1, block%column(3)), q, zeros)
-        if (zeros == 0) return
-        refused = max(refused, status_bad_attitude)
-        do l = 1, n
-            if (maxval(abs(q(:, l))) <= 0.0_wp) work%d(l, :) = -0.0_wp      ! m + d is then m, of zeros too
+        full = whole(count)
+        do l = count + 1, full
+            x(l, :) = x(count, :)
+            if (with_attitude) y(l, :) = y(count, :)
         end do
-    end subroutine turn_attitudes
+        if (block%all_plain) then
+            call flow_lanes(.false., x, y)
+            if (served) return
+        end if
+        do l = 1, full
+            good(l) = abs(block%lane(l)) > 0.5_wp .and. plain_momentum(x(l, 1), x(l, 2), x(l, 3)) > 0
+            if (good(l) .and. with_attitude) then
+                good(l) = plain_attitude(y(l, 1), y(l, 2), y(l, 3), y(l, 4)) > 0
+            end if
+            new_x(l, :) = 0.0_wp
+            new_y(l, :) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+            if (.not. good(l)) cycle
+            new_x(l, :) = x(l, :)
+            if (with_attitude) new_y(l, :) = y(l, :)
+        end do
+        call flow_lanes(.true., new_x, new_y)
+        good(:count) = good(:count) .and. is_served(work%reach(:count))
+        do l = 1, count
+            if (.not. good(l)) cycle
+            x(l, :) = new_x(l, :)
+            if (with_attitude) y(l, :) = new_y(l, :)
+        end do
+        call flow_rest(body, bodies, h, times, first, count, good, with_attitude, x, y, refused)
 
-    pure subroutine turn_rows(n, w0, w1, w2, w3, q, zeros)
+    contains
+
+        subroutine flow_lanes(in_part, u, v)
+            logical, intent(in) :: in_part
+            real(wp), intent(inout) :: u(lanes, 3), v(lanes, 4)
+
+            if (with_attitude) then
+                call flow_whole(full, block, in_part, work, served, u(:, 1), u(:, 2), u(:, 3), v(:, 1), &
+                                v(:, 2), v(:, 3), v(:, 4))
+            else
+                call flow_whole(full, block, in_part, work, served, u(:, 1), u(:, 2), u(:, 3))
+            end if
+        end subroutine flow_lanes
+
+    end subroutine flow_block
+
+    !> Those of a block that are not done, one after another.
+    subroutine flow_rest(body, bodies, h, times, first, count, done, with_attitude, x, y, refused)
+        integer, intent(in) :: bodies, times, first, count
+        type(body_core), intent(in) :: body(:)
+        real(wp), intent(in) :: h(times)
+        logical, intent(in) :: done(count), with_attitude
+        real(wp), intent(inout) :: x(lanes, 3), y(lanes, 4)
+        integer, intent(inout) :: refused
+        real(wp) :: m(3), q(4)
+        integer :: l
+
+        do l = 1, count
+            if (done(l)) cycle
+            m = x(l, :)
+            if (with_attitude) then
+                q = y(l, :)
+                call flow_single(body, bodies, h, times, first + l - 1, m, refused, q)
+                y(l, :) = q
+            else
+                call flow_single(body, bodies, h, times, first + l - 1, m, refused)
+            end if
+            x(l, :) = m
+        end do
+    end subroutine flow_rest
+
+    !> Body number k by itself.
+    subroutine flow_single(body, bodies, h, times, k, m, refused, q)
+        integer, intent(in) :: bodies, times, k
+        type(body_core), intent(in) :: body(:)
+        real(wp), intent(in) :: h(times)
+        real(wp), intent(inout) :: m(3)
+        integer, intent(inout) :: refused
+        real(wp), intent(inout), optional :: q(4)
+        integer :: code
+
+        if (present(q)) then
+            call flow_body(body(min(bodies, k)), h(min(times, k)), m, code, q)
+        else
+            call flow_body(body(min(bodies, k)), h(min(times, k)), m, code)
+        end if
+        refused = max(refused, code)
+    end subroutine flow_single
+
+    !> Whole vectors of lanes in columns, all plain or, served = .false., as they were. Lanes out of reach stay
+    !> behind if in_part; otherwise there is no step if there are such lanes.
+    subroutine flow_whole(n, block, in_part, work, served, m1, m2, m3, q0, q1, q2, q3)
+        integer, intent(in) :: n
+        type(block_of_bodies), intent(in) :: block
+        logical, intent(in) :: in_part
+        type(workspace), intent(inout) :: work
+        logical, intent(out) :: served
+        real(wp), intent(inout) :: m1(n), m2(n), m3(n)
+        real(wp), intent(inout), optional :: q0(n), q1(n), q2(n), q3(n)
+        integer(int64) :: many
+        integer :: l
+
+        many = 0
+        do l = 1, n
+            many = many + plain_momentum(m1(l), m2(l), m3(l))
+        end do
+        if (present(q0)) then
+            do l = 1, n
+                many = many + plain_attitude(q0(l), q1(l), q2(l), q3(l))
+            end do
+            many = many - n
+        end if
+        served = many == n
+        if (.not. served) return
+        call step_lanes(n, present(q0), block, m1, m2, m3, work, served)
+        if (.not. (served .or. in_part)) return
+        associate (c => block%column)
+            call add(n, work%d(1, c(1)), m1)
+            call add(n, work%d(1, c(2)), m2)
+            call add(n, work%d(1, c(3)), m3)
+            if (present(q0)) call turn_columns(n, work%w0, work%w(1, c(1)), work%w(1, c(2)), work%w(1, c(3)), &
+                                               q0, q1, q2, q3)
+        end associate
+    end subroutine flow_whole
+
+    !> 1 if the components are finite and far from overflow, else 0. Comparing a NaN would raise a flag.
+    pure function plain_momentum(m1, m2, m3) result(one)
+        real(wp), intent(in) :: m1, m2, m3
+        integer(int64) :: one
+        real(wp) :: total
+
+        total = (0.25_wp*abs(m1) + 0.25_wp*abs(m2)) + 0.25_wp*abs(m3)       ! does not overflow
+        total = merge(plain_largest, total, ieee_is_nan(total))
+        one = merge(1_int64, 0_int64, total < 0.25_wp*plain_largest)
+    end function plain_momentum
+
+    !> The same and not all of them near zero.
+    pure function plain_attitude(q0, q1, q2, q3) result(one)
+        real(wp), intent(in) :: q0, q1, q2, q3
+        integer(int64) :: one
+        real(wp) :: total
+
+        total = (0.25_wp*abs(q0) + 0.25_wp*abs(q1)) + (0.25_wp*abs(q2) + 0.25_wp*abs(q3))
+        total = merge(plain_largest, total, ieee_is_nan(total))
+        total = merge(plain_largest, total, total < plain_smallest)
+        one = merge(1_int64, 0_int64, total < 0.25_wp*plain_largest)
+    end function plain_attitude
+
+    pure subroutine add(n, d, m)
+        integer, intent(in) :: n
+        real(wp), intent(in) :: d(n)
+        real(wp), intent(inout) :: m(n)
+
+        m = m + d
+    end subroutine add
+
+    !> q + q w.
+    pure subroutine turn_columns(n, w0, w1, w2, w3, q0, q1, q2, q3)
         integer, intent(in) :: n
         real(wp), intent(in) :: w0(n), w1(n), w2(n), w3(n)
-        real(wp), intent(inout) :: q(4, n)
-        integer, intent(out) :: zeros
-        real(wp) :: q0, q1, q2, q3
-        integer(int64) :: many
+        real(wp), intent(inout) :: q0(n), q1(n), q2(n), q3(n)
         integer :: l
 
-        many = 0
         do l = 1, n
-            q0 = q(1, l)
-            q1 = q(2, l)
-            q2 = q(3, l)
-            q3 = q(4, l)
-            many = many + merge(1_int64, 0_int64, (abs(q0) + abs(q1)) + (abs(q2) + abs(q3)) <= 0.0_wp)
-            call turn(w0(l), w1(l), w2(l), w3(l), q0, q1, q2, q3)
-            q(1, l) = q0
-            q(2, l) = q1
-            q(3, l) = q2
-            q(4, l) = q3
+            call turn(w0(l), w1(l), w2(l), w3(l), q0(l), q1(l), q2(l), q3(l))
         end do
-        zeros = int(many)
-    end subroutine turn_rows
+    end subroutine turn_columns
 
     include 'turn_formulas.inc'
 
