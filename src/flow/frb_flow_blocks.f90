@@ -96,11 +96,11 @@ contains
                 block%of%b(l) = one%beta
                 block%of%g(l) = one%gamma
                 block%of%first(l) = one%a(1)
-                block%of%second(l) = one%a(2)
                 block%of%last(l) = one%a(3)
             end associate
         end do
-        call polynomial_of_rho(given, block%of)
+        block%of%alike = bodies == 1
+        if (block%of%alike) block%of%rho = polynomial_of_rho(body(1)%a)
     end subroutine gather
 
     !> The constants of the first lane in all others.
@@ -119,57 +119,53 @@ contains
                 of%ab(l + 1:l + vector) = of%ab(1)
                 of%bg(l + 1:l + vector) = of%bg(1)
                 of%first(l + 1:l + vector) = of%first(1)
-                of%second(l + 1:l + vector) = of%second(1)
+                of%base(l + 1:l + vector) = of%base(1)
                 of%last(l + 1:l + vector) = of%last(1)
                 of%rate(l + 1:l + vector) = of%rate(1)
-                do i = 1, size(of%rho, 2)
-                    of%rho(l + 1:l + vector, i) = of%rho(1, i)
+                do i = 1, size(of%above, 2)
+                    of%above(l + 1:l + vector, i) = of%above(1, i)
                 end do
             end do
         end associate
     end subroutine fill
 
-    !> The constant rho of frb_flow_lanes as a polynomial in u and e to degree 4: coefficients of u to u^4, then
-    !> of e, e u, e u^2, e u^3, of e^2 to e^2 u^2, of e^3, e^3 u and of e^4.
-    pure subroutine polynomial_of_rho(n, of)
-        integer, intent(in) :: n
-        type(lane_bodies), intent(inout) :: of
+    !> The constant rho of frb_flow_lanes as a polynomial in u and e to degree 4: coefficients of u to u^4, of
+    !> e to e u^3, of e^2 to e^2 u^2, of e^3, e^3 u and of e^4.
+    pure function polynomial_of_rho(a) result(rho)
+        real(wp), intent(in) :: a(3)        !! in descending order
+        real(wp) :: rho(14)
         real(wp) :: a2, a3, s1, s2, s3, s11, s22, s33, s12, s23, s13
-        integer :: l
 
-        do l = 1, n
-            a3 = 1/max(of%first(l), tiny(1.0_wp))
-            a2 = of%second(l)*a3
-            a3 = of%last(l)*a3
-            s1 = 1 + a2 + a3
-            s2 = a2 + a3 + a2*a3
-            s3 = a2*a3
-            s11 = s1*s1
-            s22 = s2*s2
-            s33 = s3*s3
-            s12 = s1*s2
-            s23 = s2*s3
-            s13 = s1*s3
-            of%rho(l, 1) = -s3*(2/3.0_wp)
-            of%rho(l, 2) = s23*(7/45.0_wp)
-            of%rho(l, 3) = -(s13*s3*(4/105.0_wp) + s22*s3*(22/945.0_wp))
-            of%rho(l, 4) = s12*s33*(11/525.0_wp) + s22*s23*(1/675.0_wp) - s33*s3*(2/567.0_wp)
-            of%rho(l, 5) = s2*(1/3.0_wp)
-            of%rho(l, 6) = s13*(4/45.0_wp) - s22*(8/45.0_wp)
-            of%rho(l, 7) = s12*s3*(106/945.0_wp) + s2*s22*(4/189.0_wp) - s33*(64/315.0_wp)
-            of%rho(l, 8) = s2*s33*(268/4725.0_wp) - s13*s13*(8/525.0_wp) - s12*s23*(68/1575.0_wp) &
-                           - s22*s22*(8/4725.0_wp)
-            of%rho(l, 9) = s12*(7/45.0_wp) - s3*(2/5.0_wp)
-            of%rho(l, 10) = s23*(82/315.0_wp) - s11*s3*(52/945.0_wp) - s12*s2*(16/189.0_wp)
-            of%rho(l, 11) = s12*s13*(94/1575.0_wp) + s12*s22*(8/315.0_wp) - s13*s3*(4/105.0_wp) &
-                            - s22*s3*(431/4725.0_wp)
-            of%rho(l, 12) = s11*s2*(62/945.0_wp) - s13*(8/105.0_wp) - s22*(19/315.0_wp)
-            of%rho(l, 13) = s12*s3*(8/75.0_wp) + s2*s22*(472/14175.0_wp) - s11*s13*(8/675.0_wp) &
-                            - s12*s12*(16/315.0_wp) - s33*(16/175.0_wp)
-            of%rho(l, 14) = s11*s12*(127/4725.0_wp) - s11*s3*(22/525.0_wp) - s12*s2*(19/525.0_wp) &
-                            + s23*(31/525.0_wp)
-        end do
-    end subroutine polynomial_of_rho
+        a2 = a(2)/a(1)
+        a3 = a(3)/a(1)
+        s1 = 1 + a2 + a3
+        s2 = a2 + a3 + a2*a3
+        s3 = a2*a3
+        s11 = s1*s1
+        s22 = s2*s2
+        s33 = s3*s3
+        s12 = s1*s2
+        s23 = s2*s3
+        s13 = s1*s3
+        rho(1) = -s3*(2/3.0_wp)
+        rho(2) = s23*(7/45.0_wp)
+        rho(3) = -(s13*s3*(4/105.0_wp) + s22*s3*(22/945.0_wp))
+        rho(4) = s12*s33*(11/525.0_wp) + s22*s23*(1/675.0_wp) - s33*s3*(2/567.0_wp)
+        rho(5) = s2*(1/3.0_wp)
+        rho(6) = s13*(4/45.0_wp) - s22*(8/45.0_wp)
+        rho(7) = s12*s3*(106/945.0_wp) + s2*s22*(4/189.0_wp) - s33*(64/315.0_wp)
+        rho(8) = s2*s33*(268/4725.0_wp) - s13*s13*(8/525.0_wp) - s12*s23*(68/1575.0_wp) &
+                       - s22*s22*(8/4725.0_wp)
+        rho(9) = s12*(7/45.0_wp) - s3*(2/5.0_wp)
+        rho(10) = s23*(82/315.0_wp) - s11*s3*(52/945.0_wp) - s12*s2*(16/189.0_wp)
+        rho(11) = s12*s13*(94/1575.0_wp) + s12*s22*(8/315.0_wp) - s13*s3*(4/105.0_wp) &
+                        - s22*s3*(431/4725.0_wp)
+        rho(12) = s11*s2*(62/945.0_wp) - s13*(8/105.0_wp) - s22*(19/315.0_wp)
+        rho(13) = s12*s3*(8/75.0_wp) + s2*s22*(472/14175.0_wp) - s11*s13*(8/675.0_wp) &
+                        - s12*s12*(16/315.0_wp) - s33*(16/175.0_wp)
+        rho(14) = s11*s12*(127/4725.0_wp) - s11*s3*(22/525.0_wp) - s12*s2*(19/525.0_wp) &
+                        + s23*(31/525.0_wp)
+    end function polynomial_of_rho
 
     !> Times t, and with the axes in cyclic order, the middle moment second: of odd ones the first and the
     !> last change places. `plain` lanes turn by no angle near overflow; the others get 0.
@@ -180,6 +176,7 @@ contains
         type(lane_bodies), intent(inout) :: of
         integer(int64), intent(out) :: plain
         real(wp) :: a, b, g, a1, a3, time, rate
+        logical :: odd
         integer :: l
 
         plain = 0
@@ -192,16 +189,20 @@ contains
             plain = plain + merge(1_int64, 0_int64, abs(time) > 0)
             a1 = a1*time
             a3 = min(of%last(l), plain_largest)*time
-            of%second(l) = min(of%second(l), plain_largest)*time
             a = of%a(l)*time
             b = of%b(l)*time
             g = of%g(l)*time
+            odd = lane(l) < 0
             of%rate(l) = a1
-            of%first(l) = merge(a3, a1, lane(l) < 0)
-            of%last(l) = merge(a1, a3, lane(l) < 0)
-            of%a(l) = merge(-g, a, lane(l) < 0)
-            of%b(l) = merge(-b, b, lane(l) < 0)
-            of%g(l) = merge(-a, g, lane(l) < 0)
+            of%base(l) = a3
+            of%above(l, 1) = merge(0.0_wp, b, odd)
+            of%above(l, 2) = a
+            of%above(l, 3) = merge(b, 0.0_wp, odd)
+            of%first(l) = merge(a3, a1, odd)
+            of%last(l) = merge(a1, a3, odd)
+            of%a(l) = merge(-g, a, odd)
+            of%b(l) = merge(-b, b, odd)
+            of%g(l) = merge(-a, g, odd)
             of%ag(l) = a*g
             of%ab(l) = of%a(l)*of%b(l)
             of%bg(l) = of%b(l)*of%g(l)

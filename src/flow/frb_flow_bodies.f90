@@ -281,8 +281,8 @@ contains
         refused = max(refused, code)
     end subroutine flow_single
 
-    !> Whole vectors of lanes in columns, all plain or, served = .false., as they were. Lanes out of reach stay
-    !> behind if in_part; otherwise there is no step if there are such lanes.
+    !> Whole vectors of lanes in columns, all plain or, served = .false., as they were. Lanes out of reach
+    !> stay behind if in_part; otherwise there is no step if there are such lanes.
     subroutine flow_whole(n, block, in_part, work, served, m1, m2, m3, q0, q1, q2, q3)
         integer, intent(in) :: n
         type(block_of_bodies), intent(in) :: block
@@ -312,8 +312,8 @@ contains
             call add(n, work%d(1, c(1)), m1)
             call add(n, work%d(1, c(2)), m2)
             call add(n, work%d(1, c(3)), m3)
-            if (present(q0)) call turn_columns(n, work%w0, work%w(1, c(1)), work%w(1, c(2)), work%w(1, c(3)), &
-                                               q0, q1, q2, q3)
+            if (.not. present(q0)) return
+            call turn_columns(n, work%w0, work%w(1, c(1)), work%w(1, c(2)), work%w(1, c(3)), q0, q1, q2, q3)
         end associate
     end subroutine flow_whole
 

@@ -12,9 +12,10 @@
 !> tau = tan(|m| (a3 t + b nu H))/|m|.
 !> The loops keep (X0, V), the turn up to its norm, V = X0 Y: so no division waits for another.
 !>
-!> For the shortest steps all is in series, and rho a polynomial: with a1, a2, a3 alike it is symmetric in them,
-!> so one in u = (a t |m|)^2 and e = a t (a1 t m1^2 + a2 t m2^2 + a3 t m3^2), a the largest of them, rho/(a t) =
-!> (s2 e - 2 s3 u)/3 + ..., s1, s2, s3 the symmetric functions of a1/a, a2/a, a3/a. No form, angle or root.
+!> For the shortest steps of equal bodies all is in series. rho is symmetric in a1, a2, a3, so a polynomial in
+!> u = (a t |m|)^2 and e = a t (a1 t m1^2 + a2 t m2^2 + a3 t m3^2), a the largest of them:
+!> rho/(a t) = (s2 e - 2 s3 u)/3 + ..., s1, s2, s3 the symmetric functions of a1/a, a2/a, a3/a: no form, no
+!> angle, no root. For different bodies forming the coefficients would take more than is gained.
 !>
 !> The loops are short, so that a processor has several vectors in work; each formula is called once in this
 !> module: GCC inlines only such private copies (a formula of another module took 2 to 4 times longer).
@@ -41,9 +42,11 @@ module frb_flow_lanes
     type :: lane_bodies
         real(wp) :: a(lanes), b(lanes), g(lanes)        !! alpha t, beta t, gamma t
         real(wp) :: ag(lanes), ab(lanes), bg(lanes)     !! their products
-        real(wp) :: first(lanes), second(lanes), last(lanes)    !! a1 t, a2 t, a3 t
-        real(wp) :: rate(lanes)                         !! the first or the last, the larger
-        real(wp) :: rho(lanes, 14)                      !! see polynomial_of_rho
+        real(wp) :: first(lanes), last(lanes)           !! a1 t, a3 t
+        real(wp) :: rate(lanes), base(lanes)            !! the larger and the smaller of them
+        real(wp) :: above(lanes, 3)                     !! a1 t, a2 t, a3 t less base
+        real(wp) :: rho(14)                             !! of equal bodies: polynomial_of_rho
+        logical :: alike                                !! they are equal: that polynomial holds
     end type lane_bodies
 
     !> What the loops hand to one another.
@@ -74,6 +77,7 @@ contains
 
         call measure(n, of, x1, x2, x3, work, many(1:))
         many(0) = 0
+        if (.not. of%alike) many(1) = 0
         all_served = many(classes) == n
         do class = 1, classes
             if (many(class) - many(class - 1) == n) then
@@ -106,7 +110,8 @@ contains
             p = of%bg(l)*s1 + k
             r = of%ab(l)*s3 + k
             gg = s1 + (s2 + s3)
-            reach = merge(no_reach, max(p, r, angle_as_reach*(of%rate(l)*(of%rate(l)*gg))), gg <= smallest_square)
+            reach = max(p, r, angle_as_reach*(of%rate(l)*(of%rate(l)*gg)))
+            reach = merge(no_reach, reach, gg <= smallest_square)
             work%p(l) = p
             work%r(l) = r
             work%reach(l) = reach
@@ -133,7 +138,9 @@ contains
         work%w0 = 0.0_wp
         work%w = 0.0_wp
         do class = 1, classes
-            mine(:n) = work%reach(:n) > limits(class - 1) .and. work%reach(:n) <= limits(class)
+            if (class == 1 .and. .not. of%alike) cycle
+            mine(:n) = work%reach(:n) <= limits(class)
+            if (class > merge(1, 2, of%alike)) mine(:n) = mine(:n) .and. work%reach(:n) > limits(class - 1)
             if (.not. any(mine(:n))) cycle
             m1(:n) = merge(x1, 0.0_wp, mine(:n))
             m2(:n) = merge(x2, 0.0_wp, mine(:n))
@@ -215,80 +222,6 @@ contains
             call move(n, of, x1, x2, x3, work)
         end if
     end subroutine step_class
-
-    !> The shortest steps: increments of the momentum by the addition theorem for the whole step, s in units of
-    !> t, c - 1 and d - 1 by series.
-    pure subroutine tiny_momenta(n, of, x1, x2, x3, work)
-        integer, intent(in) :: n
-        type(lane_bodies), intent(in) :: of
-        real(wp), intent(in) :: x1(n), x2(n), x3(n)
-        type(workspace), intent(inout) :: work
-        real(wp) :: m1, m2, m3, e1, e2, s, y, v, ec, ed, ky, inverse
-        integer :: l
-
-        do l = 1, n
-            m1 = x1(l)
-            m2 = x2(l)
-            m3 = x3(l)
-            e1 = work%p(l) + work%r(l)
-            e2 = work%p(l)*work%r(l)
-            s = ((2 - e1*(4/3.0_wp)) + (e1*e1)*(4/15.0_wp - e1*(8/315.0_wp))) &
-                + e2*((16/5.0_wp - e1*(352/105.0_wp)) + ((e1*e1)*(544/315.0_wp) + e2*(64/15.0_wp)))
-            y = s*s
-            v = work%r(l)*y
-            ed = v*(-0.5_wp - v*(1/8.0_wp + v*(1/16.0_wp + v*(5/128.0_wp))))
-            v = work%p(l)*y
-            ec = v*(-0.5_wp - v*(1/8.0_wp + v*(1/16.0_wp + v*(5/128.0_wp))))
-            ky = (of%ag(l)*(m2*m2))*y
-            inverse = 1/(1 - ky)
-            work%d(l, 1) = (m1*(ed + ky) - ((of%a(l)*m2)*m3)*(s + s*ec))*inverse
-            work%d(l, 2) = (m2*((ed + ec) + (ky + ed*ec)) + ((of%b(l)*m3)*m1)*s)*inverse
-            work%d(l, 3) = (m3*(ec + ky) - ((of%g(l)*m1)*m2)*(s + s*ed))*inverse
-        end do
-    end subroutine tiny_momenta
-
-    !> Their turns. L = f (m(0) + m(h)), f = s/(2 c d D) at t, and D = 1 - k f^2 by the root of it.
-    pure subroutine tiny_turns(n, of, x1, x2, x3, work)
-        integer, intent(in) :: n
-        type(lane_bodies), intent(in) :: of
-        real(wp), intent(in) :: x1(n), x2(n), x3(n)
-        type(workspace), intent(inout) :: work
-        real(wp) :: s1, s2, s3, u, e, rho, e1, e2, f, k, c1, c2, c3, square, w0
-        integer :: l
-
-        do l = 1, n
-            s1 = x1(l)*x1(l)
-            s2 = x2(l)*x2(l)
-            s3 = x3(l)*x3(l)
-            u = of%rate(l)*(of%rate(l)*(s1 + (s2 + s3)))
-            e = of%rate(l)*(of%first(l)*s1 + (of%second(l)*s2 + of%last(l)*s3))
-            rho = u*(of%rho(l, 1) + u*(of%rho(l, 2) + u*(of%rho(l, 3) + u*of%rho(l, 4)))) &
-                  + e*((of%rho(l, 5) + u*(of%rho(l, 6) + u*(of%rho(l, 7) + u*of%rho(l, 8)))) &
-                       + e*((of%rho(l, 9) + u*(of%rho(l, 10) + u*of%rho(l, 11))) &
-                            + e*((of%rho(l, 12) + u*of%rho(l, 13)) + e*of%rho(l, 14))))
-            rho = of%rate(l)*rho
-            e1 = work%p(l) + work%r(l)
-            e2 = work%p(l)*work%r(l)
-            c1 = (x1(l) + x1(l)) + work%d(l, 1)
-            c2 = (x2(l) + x2(l)) + work%d(l, 2)
-            c3 = (x3(l) + x3(l)) + work%d(l, 3)
-            f = ((0.5_wp + e1*(1/6.0_wp)) + (e1*e1)*(1/15.0_wp + e1*(17/630.0_wp))) &
-                - e2*(1/5.0_wp + e1*(11/105.0_wp))
-            k = of%ag(l)*((f*c2)*(f*c2))
-            f = f - (f*k)*(1 - k*(2 - k*(5 - k*14)))
-            c1 = (of%first(l) + rho)*c1
-            c2 = (of%second(l) + rho)*c2
-            c3 = (of%last(l) + rho)*c3
-            square = (f*f)*(c1*c1 + (c2*c2 + c3*c3))
-            w0 = square*(-0.5_wp + square*(3/8.0_wp - square*(5/16.0_wp - square*(35/128.0_wp &
-                 - square*(63/256.0_wp)))))
-            f = f + f*w0
-            work%w0(l) = w0
-            work%w(l, 1) = f*c1
-            work%w(l, 2) = f*c2
-            work%w(l, 3) = f*c3
-        end do
-    end subroutine tiny_turns
 
     !> Increments of the momentum. `keep`: with what the turn needs, or without.
     pure subroutine move(n, of, x1, x2, x3, work)
@@ -442,6 +375,8 @@ contains
             work%w(l, 3) = v3*u
         end do
     end subroutine turn_lanes
+
+    include 'lane_tiny.inc'
 
     include 'series_formulas.inc'
 
