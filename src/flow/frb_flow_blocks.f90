@@ -2,6 +2,7 @@
 !> body axes to cyclic ones, the middle moment second, and back.
 module frb_flow_blocks
     use frb_flow_lanes, only: lanes, vector, lane_bodies, workspace, step_cyclic
+    use frb_flow_lanes_long, only: step_long
     use frb_flow_limits, only: plain_largest
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
@@ -278,17 +279,29 @@ contains
 
         if (block%axes_are /= same_axes) then
             call to_cyclic(n, block, x1, x2, x3, cyclic)
-            call step_cyclic(n, with_attitude, block%of, cyclic(:, 1), cyclic(:, 2), cyclic(:, 3), work, &
-                             all_served)
+            call step_any(n, with_attitude, block%of, cyclic(:, 1), cyclic(:, 2), cyclic(:, 3), work, &
+                          all_served)
             call from_cyclic(n, block, work%d)
             if (with_attitude) call from_cyclic(n, block, work%w)
         else if (block%column(1) == 1) then
-            call step_cyclic(n, with_attitude, block%of, x1, x2, x3, work, all_served)
+            call step_any(n, with_attitude, block%of, x1, x2, x3, work, all_served)
         else if (block%column(1) == 2) then
-            call step_cyclic(n, with_attitude, block%of, x3, x1, x2, work, all_served)
+            call step_any(n, with_attitude, block%of, x3, x1, x2, work, all_served)
         else
-            call step_cyclic(n, with_attitude, block%of, x2, x3, x1, work, all_served)
+            call step_any(n, with_attitude, block%of, x2, x3, x1, work, all_served)
         end if
     end subroutine step_lanes
+
+    pure subroutine step_any(n, with_attitude, of, x1, x2, x3, work, all_served)
+        integer, intent(in) :: n
+        logical, intent(in) :: with_attitude
+        type(lane_bodies), intent(in) :: of
+        real(wp), intent(in) :: x1(n), x2(n), x3(n)
+        type(workspace), intent(inout) :: work
+        logical, intent(out) :: all_served
+
+        call step_cyclic(n, with_attitude, of, x1, x2, x3, work, all_served)
+        if (.not. all_served) call step_long(n, with_attitude, of, x1, x2, x3, work, all_served)
+    end subroutine step_any
 
 end module frb_flow_blocks

@@ -2,7 +2,8 @@
 !> there: those of rows are copied, those in columns are advanced where they are if they fill whole vectors.
 module frb_flow_bodies
     use frb_flow_blocks, only: block_of_bodies, set_bodies, step_lanes, whole
-    use frb_flow_lanes, only: lanes, workspace, is_served
+    use frb_flow_lanes, only: lanes, workspace
+    use frb_flow_lanes_long, only: is_near
     use frb_flow_limits, only: plain_largest, plain_smallest
     use frb_flow_one, only: flow_body
     use frb_inertia, only: body_core
@@ -214,7 +215,7 @@ contains
             if (with_attitude) new_y(l, :) = y(l, :)
         end do
         call flow_lanes(.true., new_x, new_y)
-        good(:count) = good(:count) .and. is_served(work%reach(:count))
+        good(:count) = good(:count) .and. is_near(work%reach(:count))
         do l = 1, count
             if (.not. good(l)) cycle
             x(l, :) = new_x(l, :)
