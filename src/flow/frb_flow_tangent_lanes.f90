@@ -254,7 +254,7 @@ contains
         end associate
     end subroutine finish_lanes
 
-    !> Attitude, and E.
+    !> Attitudes at the end, and E.
     pure subroutine set_attitudes(of, it, a0, a1, a2, a3, t11, t21, t31, t12, t22, t32, t13, t23, t33)
         type(lane_orbits), intent(in) :: of
         type(lane_ends), intent(in) :: it
@@ -296,7 +296,7 @@ contains
         end do
     end subroutine set_attitudes
 
-    !> J, and the momenta.
+    !> J, and the momenta at the end.
     pure subroutine set_jacobians(b, of, it, n1, n2, n3, t11, t21, t31, t12, t22, t32, t13, t23, t33)
         real(wp), intent(in) :: b
         type(lane_orbits), intent(in) :: of
@@ -332,7 +332,7 @@ contains
         end do
     end subroutine set_jacobians
 
-    !> W.
+    !> W, the derivative of the attitude by the momentum.
     pure subroutine set_turns(of, it, t11, t21, t31, t12, t22, t32, t13, t23, t33)
         type(lane_orbits), intent(in) :: of
         type(lane_ends), intent(in) :: it

@@ -21,7 +21,7 @@ module frb_flow_tangent_near
 
 contains
 
-    !> What finish_lanes needs.
+    !> Finds for the lanes of `of` what finish_lanes puts together; b: beta t of the body.
     pure subroutine find_near_ends(b, of, ends)
         real(wp), intent(in) :: b
         type(lane_orbits), intent(in) :: of
@@ -230,7 +230,7 @@ contains
         end do
     end subroutine find_columns
 
-    !> What W needs besides.
+    !> The covector k m + g of W, and sine and cosine of the turn about m as W needs them.
     pure subroutine find_covectors(b, k, of, it, ends)
         real(wp), intent(in) :: b
         integer, intent(in) :: k        !! the level
