@@ -2,8 +2,9 @@
 !> motion that has settled on the unstable axis, around the steps of frb_flow_tangent_one and
 !> frb_flow_tangent_long.
 module frb_flow_tangent_body
+    use frb_flow_axes, only: turn_back
     use frb_flow_limits, only: plain_largest, plain_smallest
-    use frb_flow_one, only: flow_body, turn_back
+    use frb_flow_one, only: flow_body
     use frb_flow_tangent_axis, only: follow_axis
     use frb_flow_tangent_inertia, only: inertia_columns, elements_in_axes
     use frb_flow_tangent_long, only: long_tangent
@@ -298,7 +299,7 @@ contains
         end do
     end subroutine drop_axis
 
-    !> As flow_rescaled of frb_flow_one: momentum, moments and time scaled by powers of 2 to the middle of the
+    !> As flow_rescaled of one_step.inc: momentum, moments and time scaled by powers of 2 to the middle of the
     !> exponents, a time so long that no digit of any phase is left cut to where the arithmetic holds. J and E
     !> have no unit; W goes as 1/m, dtheta' by the moments as their inverses.
     pure subroutine tangent_rescaled(body, h, m, elements, q, transition, jacobian, by_inertia)

@@ -1,7 +1,7 @@
 !> Drifts by name, to be compared in the same loop: the free flow and the paper's two steps, exact or
 !> semi-exact.
 module frb_drifts
-    use frb_flow_one, only: turn_back
+    use frb_flow_axes, only: turn_back
     use frb_free_flow, only: core_of, free_flow, rigid_body
     use frb_inertia, only: body_core
     use frb_kinds, only: wp, most_points

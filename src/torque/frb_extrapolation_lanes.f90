@@ -1,7 +1,7 @@
 !> Kick and drift of four lanes at a time, each with a step of its own: the formulas of the free flow for
 !> short steps, compensated, which costs 2 % here, in a loop that the compiler turns into one vector.
 !>
-!> The series are those of frb_flow_one, and end at degree 6 in the squares of the frequencies times t: beyond
+!> The series are those of one_step.inc, and end at degree 6 in the squares of the frequencies times t: beyond
 !> short_limit a drift is no longer exact, but an approximation of order 12.
 module frb_extrapolation_lanes
     use frb_inertia, only: body_core

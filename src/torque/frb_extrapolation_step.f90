@@ -4,7 +4,7 @@ module frb_extrapolation_step
         end_sequences, kick_and_drift, kick_and_drift_few
     use frb_extrapolation_sets, only: stages, half, kick, time_after, begin, any_ends, last_weights, &
         last_differences, torques_of_step, set_for
-    use frb_flow_one, only: flow_one
+    use frb_flow_state, only: flow_state => flow_one
     use frb_inertia, only: body_core, keep_off_axis
     use frb_kinds, only: wp
     use frb_rotations, only: quat_conjugate, quat_product, quat_rotate
@@ -193,7 +193,8 @@ contains
             m = m + h*kick(l)*state%tau(l, :)
             q = state%q(l, :)
             ! What it refuses is not finite, and shows in the result.
-            call flow_one(core, 2*h*half(l), m, code, q)
+            code = status_ok
+            call flow_state(core, 2*h*half(l), m, code, 1.0_wp, q)
             state%m(l, :) = m(form%axis)
             state%m(l, 3) = form%sign3*state%m(l, 3)
             state%q(l, :) = q
@@ -210,10 +211,10 @@ contains
         real(wp) :: excess, old
         integer :: e
 
+        code = status_ok
         if (self%is_free) then
-            call flow_one(self%core, h, self%x(1:3), code, self%x(4:7))
+            call flow_state(self%core, h, self%x(1:3), code, 1.0_wp, self%x(4:7))
         else
-            code = status_ok
             excess = 0.5_wp*(sum((self%x(4:7) + self%change(4:7))**2)/self%norm - 1)
             if (abs(excess) > noise) self%change(4:7) = self%change(4:7) &
                 - excess*(self%x(4:7) + self%change(4:7))

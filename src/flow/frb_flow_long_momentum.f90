@@ -1,0 +1,32 @@
+!> Long steps of the momentum alone of one body: see long_step.inc.
+module frb_flow_long_momentum
+    use frb_flow_limits, only: most_halvings, middle_limit, square_limit, period_limit, &
+        smallest_denominator, sin_cos_limit
+    use frb_inertia, only: body_core
+    use frb_kinds, only: wp, pi
+    implicit none
+    private
+
+    public :: long_step
+
+    logical, parameter :: with_attitude = .false.
+
+contains
+
+    include 'long_step.inc'
+
+    include 'period_formulas.inc'
+
+    include 'orbit_formulas.inc'
+
+    include 'middle_formulas.inc'
+
+    include 'middle_third_kind.inc'
+
+    include 'long_formulas.inc'
+
+    include 'angle_formulas.inc'
+
+    include 'join_formulas.inc'
+
+end module frb_flow_long_momentum
