@@ -78,8 +78,8 @@ contains
             end do
         end do
         call open_table(options, table_of(top, span), 'error of the attitude: '//trim(top%title)// &
-            '; a block per solver', 'step or tolerance, time [ns]: median, quartiles; torques, '// &
-            'error of attitude [rad]', file)
+            '; a block per solver; splittings with joined drifts', &
+            'step or tolerance, time [ns]: median, quartiles; torques, error of attitude [rad]', file)
         do i = 1, size(solvers)
             call file%put('# '//name_of(solvers(i)))
             do k = 1, settings_of_solver
