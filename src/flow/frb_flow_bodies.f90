@@ -19,7 +19,7 @@ module frb_flow_bodies
     !> As many take no longer in a block than one after another. Fewer go by flow_body; from here on what
     !> becomes of a body does not depend on the others: the same bits for any threads and parts of a batch.
     integer, parameter :: least = 7
-    logical, parameter :: none(least) = .false.
+    logical, parameter :: none(lanes) = .false.
 
 contains
 
@@ -202,6 +202,10 @@ contains
         if (block%all_plain) then
             call flow_lanes(.false., x, y)
             if (served) return
+            if (.not. any(is_near(work%reach(:count)))) then
+                call flow_rest(body, bodies, h, times, first, count, none, with_attitude, x, y, refused)
+                return
+            end if
         end if
         do l = 1, full
             good(l) = abs(block%lane(l)) > 0.5_wp .and. plain_momentum(x(l, 1), x(l, 2), x(l, 3)) > 0
@@ -306,7 +310,10 @@ contains
             many = many - n
         end if
         served = many == n
-        if (.not. served) return
+        if (.not. served) then
+            work%reach(:n) = 0.0_wp     ! not known
+            return
+        end if
         call step_lanes(n, present(q0), block, m1, m2, m3, work, served)
         if (.not. (served .or. in_part)) return
         associate (c => block%column)
