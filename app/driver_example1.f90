@@ -10,7 +10,7 @@ program driver_example1
     use frb_init_files, only: init_values
     use frb_out_files, only: out_file
     implicit none
-    !> The reader of the file has checked the sums of its coefficients to this.
+    !> The reader of the file has checked the sums of the coefficients to this tolerance.
     real(wp), parameter :: digits_of_files = 1.0e-6_wp
     type(init_values) :: start
     type(out_file) :: out

@@ -1,13 +1,13 @@
-!> The one test program: every suite, or those that are named, then the closing line `N passed, N failed`.
+!> The test program: every suite, or the named suites, then the closing line `N passed, N failed`.
 !>
 !>     fpm test                         all suites
-!>     fpm test -- flow-laws steps      these
-!>     fpm test -- --list               their names, none is run
+!>     fpm test -- flow-laws steps      these two suites
+!>     fpm test -- --list               names of the suites, none is run
 !>     fpm test -- --published          the table of data/published.dat
 !>
 !> Exit code 1 when a check failed or a name is not known. A run without its closing line has failed,
 !> whatever its exit code: something stopped in the suite whose name was written last. Two suites test the
-!> tests and run by name alone: a check fails in `--fail`, the library stops in `--stop`.
+!> tests and run only if they are named: a check fails in `--fail`, the library stops in `--stop`.
 program check
     use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
     use frb_checks, only: tally
@@ -56,7 +56,7 @@ program check
     use frb_test_tangent_duals, only: test_tangent_duals
     implicit none
 
-    !> What is done with each suite: its name is looked for among the arguments, or written, or it runs.
+    !> Tasks for each suite: look for its name among the arguments, write its name, run it.
     integer, parameter :: looking = 1, listing = 2, running = 3
     type(tally) :: t
     logical, allocatable :: known(:)
@@ -75,13 +75,13 @@ program check
         case default
         end select
         if (.not. known(i)) then
-            write (error_unit, '(a)') 'check: no such suite: '//trim(argument(i))//'; --list tells all'
+            write (error_unit, '(a)') 'check: no such suite: '//trim(argument(i))//'; --list shows all names'
             flush (error_unit)
             stop 1
         end if
     end do
     call suites(running)
-    deallocate (known)      ! what a main program keeps, a sanitizer may take for lost
+    deallocate (known)      ! else a sanitizer may report it as lost
     if (t%skipped > 0) write (output_unit, '(i0,a)') t%skipped, ' skipped'
     write (output_unit, '(i0,a,i0,a)') t%passed, ' passed, ', t%failed, ' failed'
     if (t%failed > 0) error stop 1
@@ -139,7 +139,7 @@ contains
         call suite(task, '--stop', stop_in_the_library)
     end subroutine suites
 
-    !> One suite. Without names among the arguments all run but those that test the tests.
+    !> One suite. Without names among the arguments all suites run but the two that test the tests.
     subroutine suite(task, name, test)
         integer, intent(in) :: task
         character(*), intent(in) :: name

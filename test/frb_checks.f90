@@ -1,8 +1,8 @@
 !> A small check module: named checks, counted, each failure printed with got, expected, error, tolerance.
 !>
 !> A suite opens with the number of checks it is going to make; a different count at its end is a failure,
-!> so a test that silently does not run makes the suite red. What cannot run
-!> here is counted as skipped and named.
+!> so a test that silently does not run makes the suite fail. Checks that cannot run on this system count as
+!> skipped, and their names are printed.
 module frb_checks
     use, intrinsic :: iso_fortran_env, only: output_unit
     use frb_kinds, only: wp
@@ -12,8 +12,8 @@ module frb_checks
 
     public :: tally, largest, worst_of
 
-    !> The larger of a score so far and a new one, or the largest of several new ones. NaN counts as huge: max
-    !> and maxval may pass it over.
+    !> The larger of the score so far and one or several new scores. NaN counts as huge: max and maxval may
+    !> ignore NaN.
     interface worst_of
         module procedure worst_of_two, worst_of_many
     end interface worst_of
@@ -49,7 +49,7 @@ contains
         self%announced = checks
         self%at_opening = self%passed + self%failed + self%skipped
         write (output_unit, '(a,i0,a)') 'suite '//name//' (', checks, ')'
-        ! Should the suite stop, its name is the last that was said.
+        ! If the suite stops, its name is the last line written.
         flush (output_unit)
     end subroutine open_suite
 
@@ -67,12 +67,12 @@ contains
         flush (output_unit)
     end subroutine close_suite
 
-    !> Whether `checks` checks that need something can be made; if not, they count as skipped.
+    !> Whether `checks` checks can be made that need some condition; if not, they count as skipped.
     function provided(self, there, checks, name) result(can)
         class(tally), intent(inout) :: self
-        logical, intent(in) :: there            !! what they need is there
+        logical, intent(in) :: there            !! the condition holds
         integer, intent(in) :: checks
-        character(*), intent(in) :: name        !! what they are and what they need
+        character(*), intent(in) :: name        !! of the checks, and of the condition
         logical :: can
 
         can = there
@@ -158,7 +158,7 @@ contains
         worst = worst_of_two(old, largest(new))
     end function worst_of_many
 
-    !> The largest of the scores; NaN counts as huge, and so do no scores at all.
+    !> The largest of the scores; NaN counts as huge, and an empty array too.
     pure function largest(scores)
         real(wp), intent(in) :: scores(:)
         real(wp) :: largest

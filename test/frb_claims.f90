@@ -1,6 +1,6 @@
-!> Numbers that the suites hold and the texts tell: each has its one home here. test/claims.txt lists the
-!> sentences of README and docstrings in which they stand, and a gate compares: a number is changed here, and
-!> then in the texts the gate names. Relative errors of elliptic functions are in units of epsilon.
+!> Numbers that the suites check and the texts state. test/claims.txt lists the sentences of README and
+!> docstrings that state them, and a gate compares: change a number here, then in the texts that the gate
+!> names. Relative errors of elliptic functions are in units of epsilon.
 module frb_claims
     use frb_kinds, only: wp
     implicit none
@@ -19,8 +19,8 @@ module frb_claims
     real(wp), parameter :: flow_largest = 2.0_wp
     real(wp), parameter :: kept_long = 1.0e-12_wp
 
-    ! Derivatives of the free flow: scores in units of the inherent sensitivity; rods have a median of
-    ! their own, as their angles about m are thousands of those across it.
+    ! Derivatives of the free flow: scores in units of the inherent sensitivity; rods have their own median,
+    ! because their turn about m is thousands of times their turn across m.
     real(wp), parameter :: tangent_median = 0.5_wp
     real(wp), parameter :: tangent_rods = 0.6_wp
     real(wp), parameter :: tangent_largest = 4.0_wp

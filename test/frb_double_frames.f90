@@ -1,5 +1,5 @@
 !> Rivals by van Zon and Schofield, from the text that the chart program times.
-!> fpm does not watch included text: after a change of it, build afresh.
+!> fpm does not see changes of included files: remove build/ after one.
 module frb_double_frames
     use frb_agm, only: ellip_f, ellip_k, jacobi
     use frb_kinds, only: rk => wp

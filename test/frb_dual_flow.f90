@@ -1,4 +1,4 @@
-!> The closed form of the free flow differentiated by machine, from the text that the charts compile.
+!> The closed form of the free flow with automatic derivatives, from the text that the charts compile.
 module frb_dual_flow
     use frb_kinds, only: wp
     implicit none

@@ -1,4 +1,4 @@
-!> What the suites of files share: the file they write, and what is said about an error.
+!> Helpers of the suites of files: they write the init file and look for a text in an error.
 module frb_file_cases
     implicit none
     private
@@ -11,7 +11,7 @@ module frb_file_cases
 
 contains
 
-    !> Whether there is an error, on one line, that has this part.
+    !> Whether there is an error, of one line, that contains this text.
     function says(error, part)
         character(:), allocatable, intent(in) :: error
         character(*), intent(in) :: part

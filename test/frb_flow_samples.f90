@@ -1,5 +1,5 @@
-!> What the suites of the free flow share: random motions, their truth with its inherent sensitivity, calls
-!> that leave their input alone.
+!> Helpers of the suites of the free flow: random motions, their exact states with the inherent sensitivity,
+!> calls that do not change their input.
 module frb_flow_samples
     use, intrinsic :: iso_fortran_env, only: int64
     use frb_free_flow, only: free_flow, rigid_body
@@ -11,8 +11,8 @@ module frb_flow_samples
     implicit none
     private
 
-    public :: stream, sample, random_samples, true_case, advanced, settled, same, near_separatrix, defect, &
-        diagonal, no_turn, no_rotation
+    public :: stream, sample, random_samples, true_case, advanced, made_finite, same, near_separatrix, &
+        defect, diagonal, no_turn, no_rotation
 
     real(wp), parameter :: no_turn(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
     real(wp), parameter :: no_rotation(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, &
@@ -57,7 +57,7 @@ contains
         x = 10.0_wp**self%uniform(low, high)
     end function log_uniform
 
-    !> A vector of norm one, all directions alike.
+    !> A vector of norm one, uniform over all directions.
     function direction(self) result(v)
         class(stream), intent(inout) :: self
         real(wp) :: v(3)
@@ -68,7 +68,7 @@ contains
         v = [sqrt(1 - z*z)*cos(phi), sqrt(1 - z*z)*sin(phi), z]
     end function direction
 
-    !> Moments x <= y <= 1 <= x + y: those of a body of mass, its largest moment one.
+    !> Moments x <= y <= 1 <= x + y, as every real body has, the largest moment one.
     function triangle(self) result(moments)
         class(stream), intent(inout) :: self
         real(wp) :: moments(3)
@@ -153,17 +153,17 @@ contains
         q = no_turn
         if (present(q0)) q = q0
         call free_flow(rigid_body(moments), h, m, q)
-        state = settled([m, q])
+        state = made_finite([m, q])
     end function advanced
 
-    !> The numbers, or 1e30 for all of them when one is not finite: a NaN would hide from max and maxval.
-    pure function settled(numbers) result(same)
+    !> The numbers, or 1e30 for all of them when one is not finite: max and maxval may ignore a NaN.
+    pure function made_finite(numbers) result(finite)
         real(wp), intent(in) :: numbers(:)
-        real(wp) :: same(size(numbers))
+        real(wp) :: finite(size(numbers))
 
-        same = 1.0e30_wp
-        if (all(ieee_is_finite(numbers))) same = numbers
-    end function settled
+        finite = 1.0e30_wp
+        if (all(ieee_is_finite(numbers))) finite = numbers
+    end function made_finite
 
     !> Equal to the last bit, NaN and signs of zeros included.
     pure function same(x, y) result(equal)
@@ -174,8 +174,8 @@ contains
         if (equal) equal = all(transfer(x, [0_int64]) == transfer(y, [0_int64]))
     end function same
 
-    !> How far a state (m, q) is off the orbit of (m0, identity): norm of q, and relative to their size the
-    !> norm of m, the energy, and the momentum in space. Everything finite and far from overflow.
+    !> Distance of a state (m, q) from the orbit of (m0, identity): error of the norm of q, relative errors of
+    !> the norm of m, the energy, and the momentum in space. All numbers finite and far from overflow.
     pure function defect(moments, m0, state) result(worst)
         real(wp), intent(in) :: moments(3), m0(3), state(7)
         real(wp) :: worst(4)

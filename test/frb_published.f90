@@ -15,7 +15,7 @@ module frb_published
 
     public :: published_row, published_rows
 
-    !> A published number, the library's, and how far the digits of the source let them differ.
+    !> A published number, the library's number, and the difference that the digits of the source allow.
     type :: published_row
         character(48) :: what = ''
         character(40) :: source = ''
@@ -53,7 +53,7 @@ contains
         call move_alloc(more, rows)
     end subroutine add
 
-    !> One row for each component, named what(1:), one letter or word each.
+    !> One row for each component of a vector, under its own name.
     subroutine add_vector(rows, names, source, published, ours, bound)
         type(published_row), allocatable, intent(inout) :: rows(:)
         character(*), intent(in) :: names(:), source

@@ -1,5 +1,5 @@
 !> The rivals of the charts in quadruple precision: the very texts that the chart program times.
-!> fpm does not watch included text: after a change of it, build afresh.
+!> fpm does not see changes of included files: remove build/ after one.
 module frb_quad_dmv
     use frb_kinds, only: rk => qp
     implicit none

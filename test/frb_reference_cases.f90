@@ -1,5 +1,5 @@
 !> Reads reference cases (data/reference) and scores results against them, in units of the inherent
-!> sensitivity: 1 is what rounding the inputs costs anyone.
+!> sensitivity: 1 is the error caused by rounding the input to double precision.
 module frb_reference_cases
     use frb_kinds, only: wp, qp, unit_roundoff
     use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
@@ -8,7 +8,7 @@ module frb_reference_cases
 
     public :: reference_case, read_cases, score_momentum, score_attitude, median
 
-    !> Kept to 25 digits where the compiler can: scoring in double precision adds half a unit of its own.
+    !> Kept to 25 digits where the compiler can: double precision would add half a unit to a score.
     type :: reference_case
         character(20) :: group = ''
         real(wp) :: moments(3) = 0.0_wp

@@ -1,5 +1,5 @@
 !> Reads reference cases of the derivatives of a step (data/reference) and scores results against them, in
-!> units of their own inherent sensitivity: 1 is what rounding the inputs costs anyone.
+!> units of their inherent sensitivity: 1 is the error caused by rounding the input to double precision.
 module frb_tangent_cases
     use frb_free_flow, only: rigid_body
     use frb_kinds, only: wp, qp, unit_roundoff
@@ -9,7 +9,7 @@ module frb_tangent_cases
 
     public :: tangent_case, read_tangent_cases, read_tensor_cases, score_matrix, hat
 
-    !> 22 digits are kept where the compiler can: scoring in double precision adds half a unit of its own.
+    !> Kept to 22 digits where the compiler can: double precision would add half a unit to a score.
     type :: tangent_case
         character(20) :: group = ''
         type(rigid_body) :: body
@@ -52,7 +52,7 @@ contains
         end do
     end subroutine read_tangent_cases
 
-    !> The same for bodies by a tensor.
+    !> All cases of a file of bodies by a tensor.
     subroutine read_tensor_cases(path, cases)
         character(*), intent(in) :: path
         type(tangent_case), allocatable, intent(out) :: cases(:)

@@ -1,4 +1,4 @@
-!> Rotations, inertia, status: the base everything stands on.
+!> Rotations, inertia, status: the modules that all others use.
 module frb_test_base
     use frb_checks, only: tally
     use frb_inertia, only: principal_axes, sorting_order

@@ -1,4 +1,4 @@
-!> Bodies: tensors whose axes are all but principal, rank, linear rotors, reading a body, pure calls.
+!> Bodies: tensors whose axes are nearly principal, rank, linear rotors, reading a body, pure calls.
 module frb_test_bodies
     use frb_checks, only: tally, worst_of
     use frb_flow_samples, only: stream, no_turn, no_rotation
@@ -100,7 +100,7 @@ contains
         call t%at_most('nearly-principal-axes-obey-the-equations-of-motion', worst_of_equations, 1.0e-13_wp)
     end subroutine nearly_principal_axes
 
-    !> The rank of a tensor is judged beside its largest moment: the same in every direction and unit.
+    !> The rank of a tensor is measured against its largest moment: the same in every direction and unit.
     subroutine rank_of_tensors(t)
         type(tally), intent(inout) :: t
         type(stream) :: random

@@ -80,8 +80,7 @@ contains
                         rj_bound*third)
     end subroutine identities
 
-    !> Arguments just close enough for the series alone, against one duplication more, which brings them four
-    !> times closer.
+    !> Arguments just close enough for the series alone, against the value after one more duplication.
     subroutine series_at_their_radius(t)
         type(tally), intent(inout) :: t
         real(wp), parameter :: far(4, 4) = reshape([-1, -1, 0, 1, 1, 1, 0, -1, &

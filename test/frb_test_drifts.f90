@@ -93,8 +93,8 @@ contains
         end do
     end subroutine test_runs
 
-    !> Axes almost aligned mix components of the momentum by less than their rounding: |m| wanders all the
-    !> same and does not drift, in any place of the tensor.
+    !> Nearly principal axes: the rotation to principal axes changes components of the momentum by less than
+    !> their rounding. |m| wanders and does not drift, for a small element at any place of the tensor.
     subroutine test_almost_aligned(t)
         type(tally), intent(inout) :: t
         character(9), parameter :: names(3) = ['free_flow', 'frb_step ', 'quat_step']
@@ -138,8 +138,8 @@ contains
         end do
     end subroutine test_almost_aligned
 
-    !> A body by its tensor keeps what the same body by its moments keeps, with every drift, plain and
-    !> compensated: eight of each, root mean squares of what is lost at the end.
+    !> A body by its tensor conserves as much as the same body by its moments, with every drift, plain and
+    !> compensated: eight bodies of each kind, root mean squares of the errors at the end.
     subroutine test_tensors(t)
         type(tally), intent(inout) :: t
         character(9), parameter :: names(3) = ['free_flow', 'frb_step ', 'quat_step']
@@ -202,7 +202,7 @@ contains
 
     end subroutine test_tensors
 
-    !> Names known and refused.
+    !> Names of drifts that are known, and names that are refused.
     subroutine test_names(t)
         type(tally), intent(inout) :: t
         character(14), parameter :: wrong(7) = [character(14) :: 'dmv', 'frb_step:', 'frb_step:0', &

@@ -34,7 +34,7 @@ contains
         call t%close_suite()
     end subroutine test_extrapolate
 
-    !> Order 14 with fixed steps, 12 for loose tolerances, and an estimate that is none too low.
+    !> Order 14 with fixed steps, 12 for loose tolerances, and an estimate that is not too low.
     subroutine test_order(t)
         type(tally), intent(inout) :: t
         type(top_case) :: item
@@ -42,7 +42,7 @@ contains
         real(wp) :: m(3), q(4), error(2), seen, m_ref(3), q_ref(4), h
         integer, parameter :: steps(2, 4) = reshape([15, 23, 12, 18, 26, 34, 16, 36], [2, 4])
         integer, parameter :: tops(4) = [2, 2, 3, 2]
-        ! The tolerance chooses the sequences: the first time those for the last digits.
+        ! The tolerance chooses the sequences: 0 those for the last digits.
         real(wp), parameter :: tolerances(4) = [0.0_wp, 1.0e-9_wp, 1.0e-9_wp, 1.0e-4_wp]
         integer :: i, k
 
@@ -79,7 +79,7 @@ contains
         end do
     end subroutine test_order
 
-    !> From 1 to 0: every tolerance ends, and is told.
+    !> Tolerances from 1 to 0: every run ends, and reports the tolerance that it kept.
     subroutine test_tolerances(t)
         type(tally), intent(inout) :: t
         real(wp), parameter :: tolerances(7) = [1.0_wp, 0.1_wp, 1.0e-13_wp, 1.0e-15_wp, 1.0e-20_wp, &
@@ -104,7 +104,7 @@ contains
         end do
     end subroutine test_tolerances
 
-    !> Without a torque it is the free flow, in one step, to the bit.
+    !> Without a torque the result is that of the free flow in one step, to the bit.
     subroutine test_free(t)
         type(tally), intent(inout) :: t
         type(spoilt_torque) :: none
@@ -142,7 +142,7 @@ contains
         call t%at_most('a-hardly-disturbed-separatrix-is-kept', distance(m, q, m_free, q_free), 1.0e-10_wp)
     end subroutine test_free
 
-    !> No time, time backwards, times that go on.
+    !> No time, time backwards, and a run that continues from the time of another.
     subroutine test_times(t)
         type(tally), intent(inout) :: t
         type(top_case) :: item
@@ -203,7 +203,7 @@ contains
                   .and. distance(m, q, seen%m(:, 4), seen%q(:, 4)) <= 0.0_wp)
     end subroutine test_observers
 
-    !> Many bodies: each as by itself, the others of one that is refused too.
+    !> Many bodies: each moves as by itself, also when another one is refused.
     subroutine test_many(t)
         type(tally), intent(inout) :: t
         type(top_case) :: item

@@ -34,14 +34,14 @@ module frb_test_extrapolate_torques
         procedure :: torque => switched
     end type switched_torque
 
-    !> Torques without rhyme or reason.
+    !> Torques at random: no smooth function of the attitude or the time.
     type, extends(body_scene) :: noisy_torque
         integer :: state = 1
     contains
         procedure :: torque => noise
     end type noisy_torque
 
-    !> A force that turns with time. Its parent's torque in lanes must not take the place of its own.
+    !> A force that turns with time. Torques in lanes must be its own, not those of its parent.
     type, extends(heavy_top) :: turning_force
     contains
         procedure :: torque => torque_of_turning_force

@@ -20,7 +20,7 @@ contains
         call test_steps(t)
     end subroutine test_files
 
-    !> What a file may look like, and the files that are shipped.
+    !> Forms that a file may have, and the files of the package.
     subroutine test_accepted(t)
         type(tally), intent(inout) :: t
         real(wp), parameter :: a4 = 0.314241403071447_wp
@@ -85,7 +85,7 @@ contains
         call t%close_suite()
     end subroutine test_accepted
 
-    !> Text that is not the right number of numbers: refused with file, line, item and what was expected.
+    !> Text with too few or too many numbers, or other words: refused with file, line, item and expectation.
     subroutine test_refused_text(t)
         type(tally), intent(inout) :: t
         character(*), parameter :: words(15) = [character(12) :: 'x', 'NaN', '-Inf', '1.2.3', '1e', '1e+', &
@@ -152,7 +152,7 @@ contains
         call t%close_suite()
     end subroutine test_refused_text
 
-    !> Numbers that cannot be meant.
+    !> Invalid numbers.
     subroutine test_refused_values(t)
         type(tally), intent(inout) :: t
         character(*), parameter :: rest = ' 0 0 0 1 0 0 0 1 1 1 0', scheme_a = '0 0 0 0 0 0 0 1 ', &
@@ -230,7 +230,7 @@ contains
         call t%close_suite()
     end subroutine test_steps
 
-    !> A file of this text is refused with a message that has this part.
+    !> A file with this content is refused with a message that contains `part`.
     subroutine refuse(t, name, example, content, part)
         type(tally), intent(inout) :: t
         character(*), intent(in) :: name, content, part

@@ -1,4 +1,4 @@
-!> Init files as list-directed input: what the published programs read is read here, with the same values.
+!> Init files as list-directed input: files that the published programs read are read with the same values.
 module frb_test_files_list
     use frb_checks, only: tally
     use frb_file_cases, only: identity, nl, path, says, write_text
@@ -86,7 +86,7 @@ contains
         call t%close_suite()
     end subroutine test_by_hand
 
-    !> What a list-directed read accepts but leaves unset, and what it does not accept.
+    !> Input that a list-directed read accepts but leaves unset, and input that it does not accept.
     subroutine test_refused(t)
         type(tally), intent(inout) :: t
 
@@ -111,7 +111,7 @@ contains
 
     contains
 
-        !> A file of this text is refused with a message that has this part.
+        !> A file with this content is refused with a message that contains `part`.
         subroutine refuse(name, content, part)
             character(*), intent(in) :: name, content, part
             type(init_values) :: values
@@ -124,7 +124,7 @@ contains
 
     end subroutine test_refused
 
-    !> A number too many on the line of an item, in every item of every example, is told on that line.
+    !> A number too many on the line of an item, in every item of every example: the error names that line.
     subroutine test_surplus(t)
         type(tally), intent(inout) :: t
         character(*), parameter :: lines(8) = [character(5) :: '0.1', '10', '1 2 3', '1 0 0', '0 1 0', &

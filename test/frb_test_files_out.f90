@@ -22,7 +22,7 @@ contains
         call test_version(t)
     end subroutine test_files_out
 
-    !> Records come back as they were; nothing that looks complete is left of a failed run.
+    !> Records are read back with the same values; a failed run leaves no file that looks complete.
     subroutine test_out(t)
         type(tally), intent(inout) :: t
         character(*), parameter :: out_path = 'build/test_out.dat'
@@ -70,8 +70,8 @@ contains
         call t%close_suite()
     end subroutine test_out
 
-    !> A temporary file is of this process and of one output: a file that has its name, or OUT.part, is kept,
-    !> and two outputs of one name do not mix.
+    !> Each output of each process has its own temporary file: an existing file of that name, or OUT.part, is
+    !> kept, and two outputs of one name do not mix.
     subroutine test_temporary(t)
         type(tally), intent(inout) :: t
         character(*), parameter :: out_path = 'build/test_out.dat'
@@ -112,7 +112,7 @@ contains
         call t%close_suite()
     end subroutine test_temporary
 
-    !> What cannot be replaced is written directly, and a device that is full is told.
+    !> An output that cannot be replaced is written directly, and a full device is an error.
     subroutine test_direct(t)
         type(tally), intent(inout) :: t
         type(out_file) :: out
@@ -160,7 +160,7 @@ contains
         call t%close_suite()
     end subroutine test_version
 
-    !> What there is of an output: 1 for the file itself, plus 2 for its unfinished part.
+    !> Files that exist of an output: 1 for the file itself, plus 2 for its unfinished part.
     function traces(name)
         character(*), intent(in) :: name
         integer :: traces
@@ -181,7 +181,7 @@ contains
         name = folder//'frb-'//trim(process)//'-1.part'
     end function temporary_of
 
-    !> The number of lines of a file, all of which are `text`; -1 if another one is there.
+    !> The number of lines of a file whose lines all are `text`; -1 if there is another line.
     function lines_of(name, text) result(lines)
         character(*), intent(in) :: name, text
         integer :: lines

@@ -5,7 +5,7 @@ module frb_test_flow_accuracy
     use frb_claims, only: flow_largest
     use frb_flow_limits, only: tiny_limit, short_limit, middle_limit, square_limit, period_limit, &
         tiny_turn_limit, small_turn_limit, middle_turn_limit
-    use frb_flow_samples, only: stream, true_case, advanced, settled, near_separatrix, no_turn
+    use frb_flow_samples, only: stream, true_case, advanced, made_finite, near_separatrix, no_turn
     use frb_free_flow, only: free_flow, rigid_body
     use frb_inertia, only: body_core, core_from_moments
     use frb_kinds, only: wp, qp, has_quad
@@ -32,8 +32,9 @@ contains
         call t%close_suite()
     end subroutine test_flow_accuracy
 
-    !> Where the paper's steps are at their worst: next to axes, elongated, next to symmetric and to the
-    !> separatrix; and seven steps of one to fifty decay times, where errors of 7 units are easily made.
+    !> Motions where the paper's steps have their largest errors: next to axes, elongated bodies, nearly
+    !> symmetric bodies, next to the separatrix; and seven steps of one to fifty decay times, where errors of
+    !> 7 units are easily made.
     subroutine check_taylor(t)
         type(tally), intent(inout) :: t
         real(wp), parameter :: once(7, 7) = reshape([ &
@@ -97,9 +98,9 @@ contains
         end do
     end subroutine check_taylor
 
-    !> From the identity, small steps: vector part of q relative to its own size, and the component of m that
-    !> starts at zero relative to itself. Steps on both sides of each limit of the formulas: the same, or the
-    !> score when the turn is no longer small. One body and a batch.
+    !> Small steps from the identity: error of the vector part of q, and of the component of m that starts at
+    !> zero, each relative to its own size. Steps on both sides of each limit of the formulas: the same
+    !> errors, or the score when the turn is not small. One body and a batch.
     subroutine check_increments(t)
         type(tally), intent(inout) :: t
         real(wp), parameter :: limits(8) = [tiny_limit, short_limit, middle_limit, square_limit, &
@@ -123,7 +124,7 @@ contains
             spin = norm3(m0)/minval(moments)
             do j = 0, 24
                 h = 10.0_wp**(-8.0_wp + 0.25_wp*j)/spin
-                call raise(small, moments, m0, h, zero, both_ways(moments, m0, h))
+                call update_worst(small, moments, m0, h, zero, both_ways(moments, m0, h))
             end do
             speed(1:5) = sqrt(fastest(moments, m0))
             speed(6:8) = spin
@@ -132,7 +133,7 @@ contains
                     h = 2*sqrt(limits(j)*(1 + 1.0e-6_wp*k))/speed(j)
                     state = both_ways(moments, m0, h)
                     if (h*spin < small_turn) then
-                        call raise(small, moments, m0, h, zero, state)
+                        call update_worst(small, moments, m0, h, zero, state)
                     else if (h*spin < 40) then
                         it = true_case(moments, m0, h)
                         score = worst_of(score, [score_momentum(it, state(1:3, 1)), &
@@ -157,11 +158,11 @@ contains
         m = spread(m0, 2, 33)
         q = spread(no_turn, 2, 33)
         call free_flow(rigid_body(moments), h, m, q)
-        state(:, 2) = settled([m(:, 7), q(:, 7)])
+        state(:, 2) = made_finite([m(:, 7), q(:, 7)])
     end function both_ways
 
-    !> Raises the largest relative errors so far, of the vector part of q and of m(zero), by those of a step.
-    subroutine raise(worst, moments, m0, h, zero, state)
+    !> Updates the largest relative errors, of the vector part of q and of m(zero), with those of a step.
+    subroutine update_worst(worst, moments, m0, h, zero, state)
         real(wp), intent(inout) :: worst(2)
         real(wp), intent(in) :: moments(3), m0(3), h, state(7, 2)
         integer, intent(in) :: zero
@@ -175,7 +176,7 @@ contains
             worst(1) = worst_of(worst(1), real(norm2(state(5:7, way) - q(2:4))/norm2(q(2:4)), wp))
             worst(2) = worst_of(worst(2), real(abs(state(zero, way)/m(zero) - 1), wp))
         end do
-    end subroutine raise
+    end subroutine update_worst
 
     !> max(P, R) of a motion, from the differences of the moments of a sorted body.
     pure function fastest(moments, m) result(square)

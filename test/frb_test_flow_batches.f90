@@ -1,8 +1,8 @@
-!> free_flow: refused input leaves the state untouched, in batches only that of the refused bodies; results
-!> of a batch do not depend on how it is split into parts of 7 bodies or more.
+!> free_flow: refused input leaves the state untouched, in batches the state of the refused bodies only;
+!> results of a batch do not depend on its split into parts of 7 bodies or more.
 module frb_test_flow_batches
     use frb_checks, only: tally, largest
-    use frb_flow_samples, only: stream, advanced, settled, same, no_rotation
+    use frb_flow_samples, only: stream, advanced, made_finite, same, no_rotation
     use frb_free_flow, only: free_flow, rigid_body
     use frb_kinds, only: wp
     use frb_rotations, only: quat_to_matrix
@@ -106,7 +106,7 @@ contains
         call t%ok('quaternions-that-are-not-finite-are-refused', right(5))
         call t%ok('matrices-that-are-not-finite-are-refused', right(6))
         call t%ok('quaternions-of-norm-zero-are-refused', right(7))
-        ! The same with no momentum and no time: what is wrong is wrong.
+        ! Bad input is refused with no momentum and with no time, too.
         call t%ok('no-momentum-does-not-hide-a-bad-attitude', &
                   refused(good(1), 1.0_wp, [0.0_wp, 0.0_wp, 0.0_wp], zero, no_rotation, status_bad_attitude, &
                           .false., .true.))
@@ -115,8 +115,8 @@ contains
                           status_bad_momentum, .true., .true.))
     end subroutine check_refused
 
-    !> Whether a call with this input is refused with this status and leaves it alone: the quaternion's or the
-    !> matrix's, and `alone` the momentum's.
+    !> Whether calls with this input are refused with this status and leave it unchanged: the call with the
+    !> quaternion or with the matrix and, if `alone`, the call with the momentum only.
     function refused(body, h, m_in, q_in, a_in, status, alone, by_quaternion) result(right)
         type(rigid_body), intent(in) :: body
         real(wp), intent(in) :: h, m_in(3), q_in(4), a_in(3, 3)
@@ -146,7 +146,7 @@ contains
         end if
     end function refused
 
-    !> Bad bodies, momenta and attitudes here and there among 100: they stay, the others go on as if alone.
+    !> Some bad bodies, momenta and attitudes among 100: their states stay, the others move as if alone.
     subroutine check_refused_in_batches(t)
         type(tally), intent(inout) :: t
         integer, parameter :: n = 100
@@ -214,7 +214,8 @@ contains
                 else
                     one = advanced(bodies(j)%moments(), m_in(:, j), h, q_in(:, j))
                     ! The angle turned is of size h.
-                    goes_on = goes_on .and. largest(abs(settled([m(:, j), q(:, j)]) - one)) <= 16*eps*(1 + h)
+                    goes_on = goes_on .and. &
+                        largest(abs(made_finite([m(:, j), q(:, j)]) - one)) <= 16*eps*(1 + h)
                 end if
             end do
         end subroutine compare
@@ -247,22 +248,51 @@ contains
         call t%ok('arrays-that-do-not-match-are-left-alone', same([m, q], [m_kept, q_kept]))
     end subroutine check_counts
 
-    !> 2000 bodies, short and long steps, extreme numbers, tensors, bad ones, symmetric ones mixed: the same
-    !> bits in one call and in parts of 7 bodies or more, for equal and different bodies, with and without
-    !> attitude.
+    !> 2000 bodies of all sorts, short and long steps: the same bits in one call and in parts of 7 bodies or
+    !> more, for equal and different bodies, with and without attitude.
     subroutine check_splits(t)
         type(tally), intent(inout) :: t
         integer, parameter :: n = 2000     ! enough for threads to share, in a build with OpenMP
-        integer, parameter :: splits(6) = [7, 23, 32, 40, 97, 500]     ! the last part is joined to the one before
         type(stream) :: random
         type(rigid_body), allocatable :: bodies(:)
-        real(wp), allocatable :: m_in(:, :), q_in(:, :), m1(:, :), q1(:, :), m2(:, :), q2(:, :), m3(:, :)
-        real(wp) :: tensor(3, 3), r(3, 3), size_m, q(4)
+        real(wp), allocatable :: m(:, :), q(:, :), m1(:, :), q1(:, :)
         logical :: different, equal, alone
-        integer :: i, j, k, first, last, stat
+        integer :: i, k
 
-        allocate (bodies(n), m_in(3, n), q_in(4, n), m1(3, n), q1(4, n), m2(3, n), q2(4, n), m3(3, n))
+        allocate (bodies(n), m(3, n), q(4, n))
+        call draw_batch(random, bodies, m, q)
+        different = .true.
+        equal = .true.
+        alone = .true.
+        do k = -4, 3
+            call compare_splits(bodies, 3*10.0_wp**k, m, q, different, alone)
+            call compare_splits(bodies(:1), 3*10.0_wp**k, m, q, equal, alone)
+        end do
+        call t%ok('different-bodies-give-the-same-bits-however-split', different)
+        call t%ok('equal-bodies-give-the-same-bits-however-split', equal)
+        call t%ok('momenta-alone-give-the-same-bits', alone)
+        ! Numbers about as small as a block accepts: every block must decide alike.
         do i = 1, n
+            m(:, i) = random%log_uniform(-74.7_wp, -73.0_wp)*random%direction()
+            q(:, i) = random%log_uniform(-74.7_wp, -73.0_wp)*q0
+        end do
+        allocate (m1, source=m)
+        allocate (q1, source=q)
+        call advance_in_parts(bodies(:1), n, 1.0e74_wp, m1, q1)
+        call advance_in_parts(bodies(:1), 7, 1.0e74_wp, m, q)
+        call t%ok('smallest-numbers-give-the-same-bits-however-split', &
+                  same([m], [m1]) .and. same([q], [q1]))
+    end subroutine check_splits
+
+    !> Bodies and states of all sorts: extreme numbers, tensors, symmetric bodies; some that are refused.
+    subroutine draw_batch(random, bodies, m, q)
+        type(stream), intent(inout) :: random
+        type(rigid_body), intent(out) :: bodies(:)
+        real(wp), intent(out) :: m(:, :), q(:, :)
+        real(wp) :: tensor(3, 3), r(3, 3), size_m, turn(4)
+        integer :: i
+
+        do i = 1, size(bodies)
             bodies(i) = rigid_body(random%triangle())
             size_m = 1.0_wp
             select case (mod(i, 11))
@@ -271,82 +301,71 @@ contains
             case (3)
                 size_m = random%log_uniform(-300.0_wp, 300.0_wp)
             case (4)
-                q = [random%uniform(-1.0_wp, 1.0_wp), random%direction()]
-                r = quat_to_matrix(q/norm2(q))
+                turn = [random%uniform(-1.0_wp, 1.0_wp), random%direction()]
+                r = quat_to_matrix(turn/norm2(turn))
                 tensor = matmul(r, transpose(spread(bodies(i)%moments(), 1, 3)*r))
                 bodies(i) = rigid_body(0.5_wp*(tensor + transpose(tensor)))
             case (5)
                 bodies(i) = rigid_body(random%log_uniform(-3.0_wp, 3.0_wp)*[1.0_wp, 1.0_wp, 0.5_wp])
             case default
             end select
-            m_in(:, i) = size_m*random%direction()
-            if (mod(i, 50) == 7) m_in(2, i) = not_a_number(i)
-            if (mod(i, 50) == 8) m_in(:, i) = 0.0_wp
-            q_in(:, i) = q0
-            if (mod(i, 50) == 9) q_in(:, i) = 0.0_wp
+            m(:, i) = size_m*random%direction()
+            if (mod(i, 50) == 7) m(2, i) = not_a_number(i)
+            if (mod(i, 50) == 8) m(:, i) = 0.0_wp
+            q(:, i) = q0
+            if (mod(i, 50) == 9) q(:, i) = 0.0_wp
         end do
-        different = .true.
-        equal = .true.
-        alone = .true.
-        do k = -4, 3
-            m1 = m_in
-            q1 = q_in
-            call free_flow(bodies, 3*10.0_wp**k, m1, q1, stat)
-            m3 = m_in
-            call free_flow(bodies, 3*10.0_wp**k, m3, stat)
-            do i = 1, n
-                if (mod(i, 50) /= 9) alone = alone .and. same(m3(:, i), m1(:, i))
-            end do
-            do j = 1, size(splits)
-                m2 = m_in
-                q2 = q_in
-                do first = 1, n - splits(j) + 1, splits(j)
-                    last = merge(n, first + splits(j) - 1, first + 2*splits(j) - 1 > n)
-                    call free_flow(bodies(first:last), 3*10.0_wp**k, m2(:, first:last), q2(:, first:last), &
-                                   stat)
-                end do
-                different = different .and. same([m2], [m1]) .and. same([q2], [q1])
-            end do
-            m1 = m_in
-            q1 = q_in
-            call free_flow(bodies(1), 3*10.0_wp**k, m1, q1, stat)
-            m3 = m_in
-            call free_flow(bodies(1), 3*10.0_wp**k, m3, stat)
-            do i = 1, n
-                if (mod(i, 50) /= 9) alone = alone .and. same(m3(:, i), m1(:, i))
-            end do
-            do j = 1, size(splits)
-                m2 = m_in
-                q2 = q_in
-                do first = 1, n - splits(j) + 1, splits(j)
-                    last = merge(n, first + splits(j) - 1, first + 2*splits(j) - 1 > n)
-                    call free_flow(bodies(1), 3*10.0_wp**k, m2(:, first:last), q2(:, first:last), stat)
-                end do
-                equal = equal .and. same([m2], [m1]) .and. same([q2], [q1])
-            end do
-        end do
-        call t%ok('different-bodies-give-the-same-bits-however-split', different)
-        call t%ok('equal-bodies-give-the-same-bits-however-split', equal)
-        call t%ok('momenta-alone-give-the-same-bits', alone)
-        ! Just where numbers become too small for a block, every block must say so alike.
-        do i = 1, n
-            m_in(:, i) = random%log_uniform(-74.7_wp, -73.0_wp)*random%direction()
-            q_in(:, i) = random%log_uniform(-74.7_wp, -73.0_wp)*q0
-        end do
-        m1 = m_in
-        q1 = q_in
-        call free_flow(bodies(1), 1.0e74_wp, m1, q1, stat)
-        m2 = m_in
-        q2 = q_in
-        do first = 1, n - 6, 7
-            last = merge(n, first + 6, first + 13 > n)
-            call free_flow(bodies(1), 1.0e74_wp, m2(:, first:last), q2(:, first:last), stat)
-        end do
-        call t%ok('smallest-numbers-give-the-same-bits-however-split', &
-                  same([m2], [m1]) .and. same([q2], [q1]))
-    end subroutine check_splits
+    end subroutine draw_batch
 
-    !> Fewer bodies than a block is worth give the bits of one after another.
+    !> Advances by one call, by calls for parts of several lengths, and without attitude. `equal` and `alone`
+    !> become false if parts, or momenta alone, give other bits.
+    subroutine compare_splits(bodies, h, m, q, equal, alone)
+        type(rigid_body), intent(in) :: bodies(:)       !! one for all states, or one for each state
+        real(wp), intent(in) :: h, m(:, :), q(:, :)
+        logical, intent(inout) :: equal, alone
+        integer, parameter :: lengths(6) = [7, 23, 32, 40, 97, 500]
+        real(wp), allocatable :: m1(:, :), q1(:, :), m2(:, :), q2(:, :)
+        integer :: i, stat
+
+        allocate (m1, m2, source=m)
+        allocate (q1, q2, source=q)
+        call advance_in_parts(bodies, size(m, 2), h, m1, q1)
+        if (size(bodies) == 1) then
+            call free_flow(bodies(1), h, m2, stat)
+        else
+            call free_flow(bodies, h, m2, stat)
+        end if
+        do i = 1, size(m, 2)
+            if (mod(i, 50) /= 9) alone = alone .and. same(m2(:, i), m1(:, i))
+        end do
+        do i = 1, size(lengths)
+            m2 = m
+            q2 = q
+            call advance_in_parts(bodies, lengths(i), h, m2, q2)
+            equal = equal .and. same([m2], [m1]) .and. same([q2], [q1])
+        end do
+    end subroutine compare_splits
+
+    !> Advances the states in calls for `length` states each; a shorter last part is joined to the one before.
+    subroutine advance_in_parts(bodies, length, h, m, q)
+        type(rigid_body), intent(in) :: bodies(:)       !! one for all states, or one for each state
+        integer, intent(in) :: length
+        real(wp), intent(in) :: h
+        real(wp), intent(inout) :: m(:, :), q(:, :)
+        integer :: n, first, last, stat
+
+        n = size(m, 2)
+        do first = 1, n - length + 1, length
+            last = merge(n, first + length - 1, first + 2*length - 1 > n)
+            if (size(bodies) == 1) then
+                call free_flow(bodies(1), h, m(:, first:last), q(:, first:last), stat)
+            else
+                call free_flow(bodies(first:last), h, m(:, first:last), q(:, first:last), stat)
+            end if
+        end do
+    end subroutine advance_in_parts
+
+    !> Bodies too few for a block give the bits of one body after another.
     subroutine check_few(t)
         type(tally), intent(inout) :: t
         type(stream) :: random

@@ -1,5 +1,5 @@
 !> More ways to call free_flow for many bodies: columns, each body with its own time, matrices, bodies by
-!> tensor in blocks. Each against a way that other suites hold.
+!> tensor in blocks. Each is compared with a call that other suites test.
 module frb_test_flow_columns
     use, intrinsic :: iso_fortran_env, only: int64
     use frb, only: wp, rigid_body, free_flow, free_flow_columns, quat_to_matrix, status_ok, &
@@ -14,7 +14,7 @@ module frb_test_flow_columns
 
     integer, parameter :: n = 300
     real(wp), parameter :: eps = epsilon(1.0_wp)
-    !> A batch against one by one, relative to the angles turned.
+    !> Largest difference of a batch from one body at a time, relative to the angles turned.
     real(wp), parameter :: same_motion = 16*eps
 
     !> Bodies, times and states of all sorts.
@@ -146,7 +146,7 @@ contains
                 bits = bits .and. same(mc, m) .and. same(qc, q)
             end do
             call t%ok('columns-give-the-bits-of-rows: '//trim(names(kind)), bits)
-            ! Momenta alone: the same to a unit in the last place of |m| = 1.
+            ! Without attitude the momenta are the same to a unit in the last place of |m| = 1.
             if (kind == 1 .or. kind == 4) then
                 mc = some%m
                 call by_columns(some, bodies, times, 1, n, mc, stat)
@@ -157,7 +157,7 @@ contains
         end do
     end subroutine check_columns
 
-    !> Own times and bodies, tensors among them, against one by one.
+    !> A time and a body of its own for each state, tensors among them, against one body at a time.
     subroutine check_times(t, some)
         type(tally), intent(inout) :: t
         type(sample), intent(in) :: some
@@ -226,7 +226,7 @@ contains
                   .and. maxval(abs(m(:, 78) - some%m(:, 78))) > 1.0e-3_wp)
     end subroutine check_matrices
 
-    !> What is refused stays, and the others go on.
+    !> States that are refused stay, and the others move.
     subroutine check_refused(t, some)
         type(tally), intent(inout) :: t
         type(sample), intent(in) :: some

@@ -2,7 +2,7 @@
 module frb_test_flow_fuzz
     use, intrinsic :: iso_fortran_env, only: int64, output_unit
     use frb_checks, only: tally, worst_of
-    use frb_flow_samples, only: stream, advanced, settled, defect, near_separatrix, no_turn
+    use frb_flow_samples, only: stream, advanced, made_finite, defect, near_separatrix, no_turn
     use frb_free_flow, only: free_flow, rigid_body
     use frb_kinds, only: wp, unit_roundoff
     use frb_rotations, only: norm3
@@ -15,10 +15,10 @@ module frb_test_flow_fuzz
     !> Norms and energy (relative to |m|^2/(2 I1)) after one step; momentum in space. Measured 8 and 33 eps.
     real(wp), parameter :: on_the_orbit = 8*eps
     real(wp), parameter :: in_space = 64*eps
-    !> The same where a deviation grows by 1e4 or more: next to the separatrix, over many decay times.
+    !> The same errors where a deviation grows by 1e4 or more: next to the separatrix, over many decay times.
     real(wp), parameter :: next_to_separatrix = 1.0e-11_wp
-    !> There and back, and a batch against one by one, in units of a rough inherent sensitivity; measured 16
-    !> and 0.4.
+    !> Error of a step there and back, and difference of a batch from one body at a time, in units of a rough
+    !> inherent sensitivity; measured 16 and 0.4.
     real(wp), parameter :: returned = 40.0_wp
     real(wp), parameter :: same_in_batch = 2.0_wp
     real(wp), parameter :: most_sensitive = 1.0e-11_wp
@@ -83,7 +83,7 @@ contains
             many_q = spread(no_turn, 2, width)
             call free_flow(bodies, h, many_m, many_q)
             do j = 1, width
-                there = settled([many_m(:, j), many_q(:, j)])
+                there = made_finite([many_m(:, j), many_q(:, j)])
                 one = advanced(many_moments(:, j), many_m0(:, j), h)
                 sensitive = worst_of(sensitive, bounded(defect(many_moments(:, j), many_m0(:, j), there), &
                                                     many_moments(:, j), many_m0(:, j)))
@@ -129,7 +129,7 @@ contains
         m = m*random%log_uniform(-10.0_wp, 10.0_wp)
     end subroutine draw
 
-    !> The defects with that of the energy relative to the largest energy of |m|: |m|^2/(2 I1).
+    !> The defects, with the defect of the energy relative to the largest energy for |m|, |m|^2/(2 I1).
     pure function bounded(defects, moments, m) result(scaled)
         real(wp), intent(in) :: defects(4), moments(3), m(3)
         real(wp) :: scaled(4)

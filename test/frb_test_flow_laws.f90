@@ -2,7 +2,7 @@
 !> steps of the paper.
 module frb_test_flow_laws
     use frb_checks, only: tally, largest, worst_of
-    use frb_flow_samples, only: sample, random_samples, advanced, settled, defect, diagonal, no_turn
+    use frb_flow_samples, only: sample, random_samples, advanced, made_finite, defect, diagonal, no_turn
     use frb_free_flow, only: free_flow, rigid_body
     use frb_kinds, only: wp
     use frb_matrix_step, only: frb_step
@@ -17,7 +17,7 @@ module frb_test_flow_laws
     !> Largest difference over the random motions below: two steps, at most one orbit long each, bodies away
     !> from no special case.
     real(wp), parameter :: two_steps = 200*eps
-    !> The same step in other words.
+    !> Largest difference of two calls that mean the same step.
     real(wp), parameter :: same_step = 16*eps
     !> Norms, energy, momentum in space after one step.
     real(wp), parameter :: on_the_orbit = 32*eps
@@ -117,7 +117,7 @@ contains
         call t%at_most('turned-momentum-runs-the-motion-backwards', backwards, 0.0_wp)
     end subroutine check_relabelling
 
-    !> Every way of calling gives the same motion; the norm of q and a matrix that is no rotation are carried.
+    !> Every way of calling gives the same motion; the norm of q, and a matrix that is no rotation, are kept.
     subroutine check_ways(t, samples)
         type(tally), intent(inout) :: t
         type(sample), intent(in) :: samples(:)
@@ -140,16 +140,16 @@ contains
                 state = advanced(it%moments, it%m, it%h, it%q)
                 m = it%m
                 call free_flow(body, it%h, m)
-                alone = worst_of(alone, [abs(settled(m) - state(1:3))])
+                alone = worst_of(alone, [abs(made_finite(m) - state(1:3))])
                 m = it%m
                 a = quat_to_matrix(it%q)
                 call free_flow(body, it%h, m, a)
-                matrix = worst_of(matrix, [abs(settled([a]) - [quat_to_matrix(state(4:7))]), &
-                             abs(settled(m) - state(1:3))*huge(1)])
+                matrix = worst_of(matrix, [abs(made_finite([a]) - [quat_to_matrix(state(4:7))]), &
+                             abs(made_finite(m) - state(1:3))*huge(1)])
                 m = it%m
                 a = matmul(shear, quat_to_matrix(it%q))
                 call free_flow(body, it%h, m, a)
-                sheared = worst_of(sheared, [abs(settled([a]) &
+                sheared = worst_of(sheared, [abs(made_finite([a]) &
                                                   - [matmul(shear, quat_to_matrix(state(4:7)))])])
                 norm = worst_of(norm, [abs(advanced(it%moments, it%m, it%h, 4*it%q) &
                                             - [state(1:3), 4*state(4:7)])])
@@ -169,12 +169,12 @@ contains
                 call free_flow(body, it%h, m2, q2)
                 call free_flow(bodies, it%h, m3)
                 call free_flow(bodies, it%h, m4, q4)
-                many_alone = worst_of(many_alone, [abs(settled([m1 - m2, m3 - m4]))])
+                many_alone = worst_of(many_alone, [abs(made_finite([m1 - m2, m3 - m4]))])
                 do j = 1, 45
                     associate (other => samples(1 + mod(i + 7*j, size(samples))))
-                        many = worst_of(many, [abs(settled([m2(:, j), q2(:, j)]) &
+                        many = worst_of(many, [abs(made_finite([m2(:, j), q2(:, j)]) &
                                                     - advanced(it%moments, other%m, it%h, other%q)), &
-                                   abs(settled([m4(:, j), q4(:, j)]) &
+                                   abs(made_finite([m4(:, j), q4(:, j)]) &
                                               - advanced(other%moments, other%m, it%h, other%q))])
                     end associate
                 end do
@@ -189,7 +189,7 @@ contains
     end subroutine check_ways
 
     !> A body given by its tensor moves as the body with its principal moments does, seen in other axes; over
-    !> 100 000 steps as well, with nothing gathering.
+    !> 100 000 steps as well, where rounding must not add up.
     subroutine check_tensor(t, samples)
         type(tally), intent(inout) :: t
         type(sample), intent(in) :: samples(:)
@@ -214,12 +214,12 @@ contains
                 q = quat_product(it%q, quat_conjugate(other%q))
                 a = quat_to_matrix(q)
                 call free_flow(body, it%h, m, q)
-                worst(1) = worst_of(worst(1), [abs(settled(m) - matmul(r, p))])
-                worst(2) = worst_of(worst(2), [abs(settled(q) &
+                worst(1) = worst_of(worst(1), [abs(made_finite(m) - matmul(r, p))])
+                worst(2) = worst_of(worst(2), [abs(made_finite(q) &
                                                     - quat_product(p_q, quat_conjugate(other%q)))])
                 m = matmul(r, it%m)
                 call free_flow(body, it%h, m, a)
-                worst(3) = worst_of(worst(3), [abs(settled([a]) - [quat_to_matrix(q)])])
+                worst(3) = worst_of(worst(3), [abs(made_finite([a]) - [quat_to_matrix(q)])])
             end associate
         end do
         call t%at_most('tensor-body-moves-as-its-principal-body: m', worst(1), two_steps)
@@ -241,9 +241,9 @@ contains
                 call free_flow(body, 0.01_wp, m, q)
                 call free_flow(plain, 0.01_wp, p, p_q)
             end do
-            worst(1) = largest(abs(settled(m) - matmul(body%axes(), p)))
-            worst(2) = largest(abs(settled(q) - quat_product(p_q, turn)))
-            orbit = defect(body%moments(), it%m, settled([matmul(m, body%axes()), &
+            worst(1) = largest(abs(made_finite(m) - matmul(body%axes(), p)))
+            worst(2) = largest(abs(made_finite(q) - quat_product(p_q, turn)))
+            orbit = defect(body%moments(), it%m, made_finite([matmul(m, body%axes()), &
                                                           quat_product(q, matrix_to_quat(body%axes()))]))
         end associate
         call t%at_most('tensor-body-over-long-runs-agrees-with-its-principal-body', &

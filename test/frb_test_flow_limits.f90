@@ -1,8 +1,9 @@
-!> free_flow at its limits, each against a closed form written for it alone: sphere, symmetric tops, rotation
-!> about an axis, the separatrix; next to the separatrix against Taylor series.
+!> free_flow in its limits, each against its own closed form: sphere, symmetric tops, rotation about an axis,
+!> the separatrix; next to the separatrix against Taylor series.
 module frb_test_flow_limits
     use frb_checks, only: tally, worst_of
-    use frb_flow_samples, only: stream, true_case, advanced, settled, near_separatrix, no_turn, no_rotation
+    use frb_flow_samples, only: stream, true_case, advanced, made_finite, near_separatrix, no_turn, &
+        no_rotation
     use frb_free_flow, only: free_flow, rigid_body
     use frb_kinds, only: wp, qp, has_quad
     use frb_reference_cases, only: reference_case, score_momentum, score_attitude
@@ -187,7 +188,7 @@ contains
             f = [0.0_qp, 1.0_qp, 0.0_qp] - n0(2)*n0
             f = f/norm2(f)
             psi = g*h/3
-            ! The body's vectors m, axis 2 less its part along m, and their product, in both frames.
+            ! Three vectors in both frames: m, the part of axis 2 across m, and their vector product.
             from(:, 1) = m_true/g
             from(:, 2) = [-tanh(kappa)*m0(1)/across, 1/cosh(kappa), -tanh(kappa)*m0(3)/across]
             from(:, 3) = cross4(from(:, 1), from(:, 2))
@@ -196,15 +197,15 @@ contains
             to(:, 3) = cross4(to(:, 1), to(:, 2))
             truth = matmul(to, transpose(from))
             if (i > short) then
-                far = worst_of(far, [real(norm2(settled(m) - m_true)/g/(1 + abs(g*h)), wp), &
-                          real(norm2(settled([a]) - [truth])/(1 + abs(g*h)), wp)])
+                far = worst_of(far, [real(norm2(made_finite(m) - m_true)/g/(1 + abs(g*h)), wp), &
+                          real(norm2(made_finite([a]) - [truth])/(1 + abs(g*h)), wp)])
                 cycle
             end if
             it = true_case(moments, m0, h)
             it%m = m_true
-            worst(1) = worst_of(worst(1), score_momentum(it, settled(m)))
-            worst(2) = worst_of(worst(2), real(norm2(reshape(settled([a]) - [truth], [9]))/sqrt(2.0_qp), wp) &
-                           /(eps + it%sens_q))
+            worst(1) = worst_of(worst(1), score_momentum(it, made_finite(m)))
+            worst(2) = worst_of(worst(2), &
+                real(norm2(reshape(made_finite([a]) - [truth], [9]))/sqrt(2.0_qp), wp)/(eps + it%sens_q))
         end do
         call t%at_most('separatrix-momentum-is-hyperbolic', worst(1), separatrix_score)
         call t%at_most('separatrix-attitude-precesses-evenly', worst(2), separatrix_score)
@@ -243,8 +244,8 @@ contains
                     call free_flow(rigid_body(moments), h, m, q)
                     m1 = m(:, 5)
                     q1 = q(:, 5)
-                    batch(1) = worst_of(batch(1), score_momentum(it, settled(m1)))
-                    batch(2) = worst_of(batch(2), score_attitude(it, settled(q1)))
+                    batch(1) = worst_of(batch(1), score_momentum(it, made_finite(m1)))
+                    batch(2) = worst_of(batch(2), score_attitude(it, made_finite(q1)))
                 end do
             end do
         end do

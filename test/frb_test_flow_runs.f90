@@ -1,10 +1,10 @@
-!> free_flow over many steps: how errors gather, next to the discrete Moser-Veselov method of order 10, and
-!> what is conserved over a million steps.
+!> free_flow over many steps: growth of errors, also against the discrete Moser-Veselov method of order 10,
+!> and conserved quantities over a million steps.
 module frb_test_flow_runs
     use frb_checks, only: tally, largest, worst_of
     use frb_claims, only: kept => kept_long
     use frb_double_dmv, only: dmv_body, new_dmv_body, dmv_steps
-    use frb_flow_samples, only: stream, true_case, settled, no_turn, no_rotation
+    use frb_flow_samples, only: stream, true_case, made_finite, no_turn, no_rotation
     use frb_free_flow, only: free_flow, rigid_body
     use frb_kinds, only: wp, unit_roundoff
     use frb_reference_cases, only: reference_case, score_momentum, score_attitude
@@ -24,8 +24,8 @@ module frb_test_flow_runs
     !> Slope of log(error) against log(N) from 64 to 16384 steps: 1/2 for a random walk, 1 for a bias.
     !> Measured: 0.54 (m) and 0.46 (q).
     real(wp), parameter :: steepest = 0.7_wp
-    !> Times the error of order 10 of the discrete Moser-Veselov method, where that is at rounding level.
-    !> Measured: 1.21 (m) and 1.06 (q).
+    !> Largest ratio to the error of the discrete Moser-Veselov method of order 10, where that error is
+    !> rounding. Measured: 1.21 (m) and 1.06 (q).
     real(wp), parameter :: against_dmv = 2.0_wp
     !> Over 48 motions of 20 000 short steps, in units of the walk 2^-53 sqrt(steps): mean and furthest.
     !> Measured: 0.06 and 0.9.
@@ -73,11 +73,13 @@ contains
                 do step = 1, n
                     call free_flow(body, 16.0_wp/n, m, q)
                 end do
-                free(:, k) = free(:, k) + [score_momentum(it, settled(m)), score_attitude(it, settled(q))]**2
+                free(:, k) = free(:, k) + [score_momentum(it, made_finite(m)), &
+                    score_attitude(it, made_finite(q))]**2
                 m = it%m0
                 q = no_turn
                 call dmv_steps(rival, 10, 16.0_wp/n, n, m, q)
-                dmv(:, k) = dmv(:, k) + [score_momentum(it, settled(m)), score_attitude(it, settled(q))]**2
+                dmv(:, k) = dmv(:, k) + [score_momentum(it, made_finite(m)), &
+                    score_attitude(it, made_finite(q))]**2
                 if (i > 4 .or. k > 6) cycle
                 many_m = spread(it%m0, 2, 33)
                 many_q = spread(no_turn, 2, 33)
@@ -86,8 +88,8 @@ contains
                 end do
                 m = many_m(:, 17)
                 q = many_q(:, 17)
-                batch(:, k) = worst_of(batch(:, k), [score_momentum(it, settled(m)), &
-                                                score_attitude(it, settled(q))])
+                batch(:, k) = worst_of(batch(:, k), [score_momentum(it, made_finite(m)), &
+                                                score_attitude(it, made_finite(q))])
             end do
         end do
         free = sqrt(free/bodies)
@@ -135,18 +137,18 @@ contains
             call free_flow(body, 0.01_wp, m, q)
             call free_flow(body, 0.01_wp, m_alone)
         end do
-        call t%at_most('norm-of-m-after-a-million-steps', abs(norm3(settled(m))/norm3(m0) - 1), kept)
-        call t%at_most('norm-of-q-after-a-million-steps', abs(norm2(settled(q)) - 1), kept)
-        call t%at_most('energy-after-a-million-steps', energy_change(moments, m0, settled(m)), kept)
+        call t%at_most('norm-of-m-after-a-million-steps', abs(norm3(made_finite(m))/norm3(m0) - 1), kept)
+        call t%at_most('norm-of-q-after-a-million-steps', abs(norm2(made_finite(q)) - 1), kept)
+        call t%at_most('energy-after-a-million-steps', energy_change(moments, m0, made_finite(m)), kept)
         call t%at_most('momentum-in-space-after-a-million-steps', &
-                       norm3(quat_rotate(settled(q), m) - m0)/norm3(m0), kept)
+                       norm3(quat_rotate(made_finite(q), m) - m0)/norm3(m0), kept)
         call t%at_most('momentum-alone-is-the-same-after-a-million-steps', largest(abs(m_alone - m)), 0.0_wp)
         do step = steps + 1, 10*steps
             call free_flow(body, 0.01_wp, m, q)
         end do
-        call t%at_most('norm-of-m-after-ten-million-steps', abs(norm3(settled(m))/norm3(m0) - 1), kept)
-        call t%at_most('norm-of-q-after-ten-million-steps', abs(norm2(settled(q)) - 1), kept)
-        call t%at_most('energy-after-ten-million-steps', energy_change(moments, m0, settled(m)), kept)
+        call t%at_most('norm-of-m-after-ten-million-steps', abs(norm3(made_finite(m))/norm3(m0) - 1), kept)
+        call t%at_most('norm-of-q-after-ten-million-steps', abs(norm2(made_finite(q)) - 1), kept)
+        call t%at_most('energy-after-ten-million-steps', energy_change(moments, m0, made_finite(m)), kept)
         m_matrix = m0
         a = no_rotation
         many_m(:, 1) = m0
@@ -160,8 +162,8 @@ contains
         call t%at_most('momentum-in-space-by-the-matrix-over-1e5-steps', &
                        norm3(matmul(a, m_matrix) - m0)/norm3(m0), kept)
         call t%at_most('norm-of-m-in-a-batch-over-1e5-steps', &
-                       abs(norm3(settled(many_m(:, 1)))/norm3(m0) - 1), kept)
-        call t%at_most('norm-of-q-in-a-batch-over-1e5-steps', abs(norm2(settled(many_q(:, 1))) - 1), kept)
+                       abs(norm3(made_finite(many_m(:, 1)))/norm3(m0) - 1), kept)
+        call t%at_most('norm-of-q-in-a-batch-over-1e5-steps', abs(norm2(made_finite(many_q(:, 1))) - 1), kept)
     end subroutine check_million
 
     !> |change of the energy| relative to itself, from the increment of m.
@@ -172,8 +174,8 @@ contains
         change = abs(sum((m - m0)*(m + m0)/moments)/sum(m0*m0/moments))
     end function energy_change
 
-    !> Many motions: after short steps the norms and the energy have walked, with no common sign; long steps
-    !> may drift, by a fraction of a rounding a step.
+    !> Many motions. Over short steps the norms and the energy walk at random, without a common sign; over
+    !> long steps they may drift, by a fraction of a rounding per step.
     subroutine check_bias(t)
         type(tally), intent(inout) :: t
         integer, parameter :: motions = 48, steps = 20000
@@ -196,7 +198,7 @@ contains
                 do step = 1, steps
                     call free_flow(body, h, m, q)
                 end do
-                drift = settled([sum((m - m0)*(m + m0))/2, (sum(q*q) - 1)/2, &
+                drift = made_finite([sum((m - m0)*(m + m0))/2, (sum(q*q) - 1)/2, &
                                  sum((m - m0)*(m + m0)/moments)/sum(m0*m0/moments)/2])
                 mean = mean + drift/motions
                 furthest = worst_of(furthest, abs(drift))

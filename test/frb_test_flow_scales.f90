@@ -25,17 +25,13 @@ contains
         call t%close_suite()
     end subroutine test_flow_scales
 
-    !> Other units, by powers of 2, give the same bits as long as no number is denormal; extreme momenta,
-    !> moments and times stay on the orbit.
+    !> Other units, by powers of 2, give the same bits as long as no number is denormal.
     subroutine check_scales(t)
         type(tally), intent(inout) :: t
         integer, parameter :: powers(8) = [-900, -500, -200, -20, 20, 200, 500, 900]
-        real(wp), parameter :: sizes(8) = [1.0e-290_wp, 1.0e-200_wp, 1.0e-100_wp, 1.0e-10_wp, 1.0_wp, &
-                                           1.0e50_wp, 1.0e150_wp, 1.0e300_wp]
         type(stream) :: random
-        real(wp) :: moments(3), m0(3), h, state(7), other(7), by_m, by_i, worst(4), denormal, longest
-        integer :: i, j, k, l
-        logical :: good
+        real(wp) :: moments(3), m0(3), h, state(7), other(7), by_m, by_i, denormal
+        integer :: i, j
 
         by_m = 0.0_wp
         by_i = 0.0_wp
@@ -60,6 +56,18 @@ contains
         call t%at_most('momentum-scales-as-one-over-time-to-the-last-bit', by_m, 0.0_wp)
         call t%at_most('moments-scale-as-time-to-the-last-bit', by_i, 0.0_wp)
         call t%at_most('denormal-momenta-move-to-their-last-bit', denormal, 1.0_wp)
+        call check_extremes(t, random)
+    end subroutine check_scales
+
+    !> Extreme momenta, moments and times stay on the orbit.
+    subroutine check_extremes(t, random)
+        type(tally), intent(inout) :: t
+        type(stream), intent(inout) :: random
+        real(wp), parameter :: sizes(8) = [1.0e-290_wp, 1.0e-200_wp, 1.0e-100_wp, 1.0e-10_wp, 1.0_wp, &
+                                           1.0e50_wp, 1.0e150_wp, 1.0e300_wp]
+        real(wp) :: moments(3), m0(3), h, state(7), worst(4), longest
+        integer :: i, j, k, l
+        logical :: good
 
         worst = 0.0_wp
         good = .true.
@@ -86,7 +94,7 @@ contains
         call t%at_most('extreme-numbers-keep-the-energy', worst(3), on_the_orbit)
         call t%at_most('extreme-numbers-keep-the-momentum-in-space', worst(4), on_the_orbit)
 
-        ! The largest numbers there are, at any time: sums and products must not overflow on the way.
+        ! The largest numbers, at any time: sums and products must not overflow.
         worst = 0.0_wp
         longest = huge(1.0_wp)
         do i = 1, 20
@@ -108,7 +116,7 @@ contains
         end do
         call t%at_most('moments-of-all-sizes-at-once-stay-on-the-orbit', largest(worst([1, 2, 4])), &
                        on_the_orbit)
-    end subroutine check_scales
+    end subroutine check_extremes
 
     !> No time, no momentum, no bodies: nothing moves, to the last bit.
     subroutine check_nothing(t)

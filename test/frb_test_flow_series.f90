@@ -1,6 +1,6 @@
 !> The series of the free flow, coefficient by coefficient: in quadruple precision each equals the sum of the
-!> same terms as its recursion makes them, at arguments far beyond those it is used for. Rounding would hide a
-!> wrong last coefficient; this does not.
+!> terms that its recursion gives, at arguments far larger than in use. In double precision rounding would
+!> hide a wrong last coefficient.
 module frb_test_flow_series
     use frb_checks, only: tally, largest, worst_of
     use frb_double_flow_formulas, only: sin_cos
@@ -122,8 +122,8 @@ contains
         end do
     end function turn_error
 
-    !> The first terms have those coefficients of the whole series that they take: at arguments so small that
-    !> what they leave out is beyond quadruple precision.
+    !> The short series have the first coefficients of the whole series: checked at arguments so small that
+    !> the terms left out are below quadruple precision.
     function tiny_error() result(error)
         real(rp) :: error
         real(wp), parameter :: p = 3.0e-9_wp, r = 5.0e-9_wp, smaller = 1.0e-3_wp

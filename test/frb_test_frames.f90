@@ -51,7 +51,7 @@ contains
         end do
     end subroutine samples
 
-    !> Arrays against one by one, one by one against matrices and the Hamilton product.
+    !> Calls with arrays against calls one by one, these against matrices and the Hamilton product.
     subroutine test_rotations(t)
         type(tally), intent(inout) :: t
         real(wp) :: q(4, n), v(3, n), w(3, n), back(3, n), p4(4, n), worst(8), size_of_v, expected(4)
@@ -181,7 +181,8 @@ contains
         call langevin_kick(body, 1.0e-12_wp, 1.0_wp, 1.0e-3_wp, noise, m)
         call t%close_to('short-kicks-lose-no-digits', m/noise, &
                         sqrt(2.0e-15_wp)*[1.0_wp, 2.0_wp, 1.5_wp], 1.0e-22_wp)
-        ! The variance left by two kicks is that of one, and the canonical one stays: sigma^2 + decay^2 = 1.
+        ! Two half kicks leave the variance of one kick, and a kick keeps the canonical variance:
+        ! sigma^2 + decay^2 = 1.
         sigma = 0.0_wp
         call langevin_kick(body, friction, 1.0_wp, 0.3_wp, [1.0_wp, 1.0_wp, 1.0_wp], sigma)
         m = [1.0_wp, 1.0_wp, 1.0_wp]
@@ -206,7 +207,7 @@ contains
         call t%close_to('kicks-without-noise-compose', m, exp(-0.3_wp*friction)*start, 8*eps)
     end subroutine test_kick
 
-    !> Arrays against one by one.
+    !> Calls with arrays against calls one by one.
     subroutine test_kick_shapes(t)
         type(tally), intent(inout) :: t
         real(wp), parameter :: friction(3) = [0.5_wp, 1.0_wp, 4.0_wp]

@@ -3,7 +3,7 @@
 module frb_test_free_flow
     use frb_checks, only: tally, largest
     use frb_claims, only: flow_median, flow_largest
-    use frb_flow_samples, only: settled, no_turn, no_rotation
+    use frb_flow_samples, only: made_finite, no_turn, no_rotation
     use frb_free_flow, only: free_flow, rigid_body
     use frb_kinds, only: wp
     use frb_reference_cases, only: reference_case, read_cases, score_momentum, score_attitude, median
@@ -13,7 +13,7 @@ module frb_test_free_flow
 
     public :: test_free_flow
 
-    !> The bars, for every group and way of calling, in units of the inherent sensitivity. Measured on these
+    !> The bounds, for every group and way of calling, in units of the inherent sensitivity. Measured on these
     !> 650 cases by four builds, with and without fused operations: medians 0.30 (m) and 0.48 (q), largest 1.6
     !> (m) and 1.5 (q), batch against one body 1.4.
     real(wp), parameter :: largest_difference = 2.0_wp  !! batch against one body
@@ -90,16 +90,16 @@ contains
             one_m = it%m0
             one_q = no_turn
             call free_flow(body, it%h, one_m, one_q)
-            score_m(1) = score_momentum(it, settled(one_m))
-            score_q(1) = score_attitude(it, settled(one_q))
+            score_m(1) = score_momentum(it, made_finite(one_m))
+            score_q(1) = score_attitude(it, made_finite(one_q))
             m = it%m0
             a = no_rotation
             call free_flow(body, it%h, m, a)
-            score_m(2) = score_momentum(it, settled(m))
-            score_q(2) = score_attitude(it, settled(matrix_to_quat(a)))
+            score_m(2) = score_momentum(it, made_finite(m))
+            score_q(2) = score_attitude(it, made_finite(matrix_to_quat(a)))
             m = it%m0
             call free_flow(body, it%h, m)
-            score_m(3) = score_momentum(it, settled(m))
+            score_m(3) = score_momentum(it, made_finite(m))
             score_q(3) = 0.0_wp
             lane = 1 + mod(7*i, n)
             do j = 1, n
@@ -112,8 +112,8 @@ contains
             call free_flow(bodies, it%h, many_m, many_q)
             m = many_m(:, lane)
             q = many_q(:, lane)
-            score_m(4) = score_momentum(it, settled(m))
-            score_q(4) = score_attitude(it, settled(q))
+            score_m(4) = score_momentum(it, made_finite(m))
+            score_q(4) = score_attitude(it, made_finite(q))
             apart(1) = largest([units_m(it, m, one_m), units_q(it, q, one_q)])
             do j = 1, n
                 many_m(:, j) = cases(1 + modulo(i - 1 + j - lane, size(cases)))%m0
@@ -122,13 +122,13 @@ contains
             call free_flow(body, it%h, many_m, many_q)
             m = many_m(:, lane)
             q = many_q(:, lane)
-            score_m(5) = score_momentum(it, settled(m))
-            score_q(5) = score_attitude(it, settled(q))
+            score_m(5) = score_momentum(it, made_finite(m))
+            score_q(5) = score_attitude(it, made_finite(q))
             apart(2) = largest([units_m(it, m, one_m), units_q(it, q, one_q)])
         end associate
     end subroutine score_case
 
-    !> Two momenta apart, in units of the score.
+    !> Distance of two momenta, in units of the score.
     pure function units_m(it, m, n) result(units)
         type(reference_case), intent(in) :: it
         real(wp), intent(in) :: m(3), n(3)
@@ -140,7 +140,7 @@ contains
         units = score_momentum(other, m)
     end function units_m
 
-    !> Two attitudes apart, sign and all, in units of the score.
+    !> Distance of two quaternions, with their signs, in units of the score.
     pure function units_q(it, q, p) result(units)
         type(reference_case), intent(in) :: it
         real(wp), intent(in) :: q(4), p(4)

@@ -18,32 +18,19 @@ module frb_test_free_motion
     real(wp), parameter :: eps = epsilon(1.0_wp)
     real(wp), parameter :: unit(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
     real(wp), parameter :: start(4) = [0.5_wp, -0.5_wp, 0.5_wp, 0.5_wp]
+    real(wp), parameter :: times(4) = [0.0_wp, -3.5_wp, 12.0_wp, 1.0e4_wp]
 
 contains
 
     subroutine test_free_motion(t)
         type(tally), intent(inout) :: t
-        type(reference_case), allocatable :: cases(:)
         type(free_motion) :: motion
-        real(wp) :: worst_m, worst_q, m(3), q(4), moved_m(3), moved_q(4), ms(3, 4), qs(4, 4), nan
-        real(wp), parameter :: times(4) = [0.0_wp, -3.5_wp, 12.0_wp, 1.0e4_wp]
-        integer :: i, stat
+        real(wp) :: m(3), q(4), moved_m(3), moved_q(4), ms(3, 4), qs(4, 4)
+        integer :: i
         logical :: same
 
         call t%open_suite('free-motion', 51)
-        nan = ieee_value(1.0_wp, ieee_quiet_nan)
-        call read_cases('data/reference/cases.txt', cases)
-        worst_m = 0.0_wp
-        worst_q = 0.0_wp
-        do i = 1, size(cases)
-            motion = free_motion(rigid_body(cases(i)%moments), cases(i)%m0, unit)
-            call motion%at(cases(i)%h, m, q)
-            worst_m = worst_of(worst_m, score_momentum(cases(i), m))
-            worst_q = worst_of(worst_q, score_attitude(cases(i), q))
-        end do
-        call t%at_most('momentum-at-any-time-is-within-4-units', worst_m, 4.0_wp)
-        call t%at_most('attitude-at-any-time-is-within-4-units', worst_q, 4.0_wp)
-
+        call check_cases(t)
         call check_period(t, [1.0_wp, 2.0_wp, 3.0_wp], [0.3_wp, 0.5_wp, 0.8_wp], 'about-the-third-axis')
         call check_period(t, [3.0_wp, 1.0_wp, 2.0_wp], [0.1_wp, -0.9_wp, 0.3_wp], 'about-the-first-axis')
         call check_period(t, [2.0_wp, 2.0_wp, 3.0_wp], [0.4_wp, 0.1_wp, -0.7_wp], 'of-a-symmetric-body')
@@ -77,8 +64,42 @@ contains
         moved_q = start
         call free_flow(rigid_body([2.0_wp, 3.0_wp, 6.0_wp]), 12.0_wp, moved_m, moved_q)
         call t%close_to('sign-of-the-quaternion-is-that-of-the-flow', qs(:, 3), moved_q, 64*eps)
+        call check_refused(t)
+        call check_precession(t)
+        call check_published_periods(t)
+        call t%close_suite()
+    end subroutine test_free_motion
 
-        motion = free_motion(rigid_body([-1.0_wp, 2.0_wp, 3.0_wp]), m, q)
+    !> The states of all reference cases, in units of the inherent sensitivity.
+    subroutine check_cases(t)
+        type(tally), intent(inout) :: t
+        type(reference_case), allocatable :: cases(:)
+        type(free_motion) :: motion
+        real(wp) :: worst_m, worst_q, m(3), q(4)
+        integer :: i
+
+        call read_cases('data/reference/cases.txt', cases)
+        worst_m = 0.0_wp
+        worst_q = 0.0_wp
+        do i = 1, size(cases)
+            motion = free_motion(rigid_body(cases(i)%moments), cases(i)%m0, unit)
+            call motion%at(cases(i)%h, m, q)
+            worst_m = worst_of(worst_m, score_momentum(cases(i), m))
+            worst_q = worst_of(worst_q, score_attitude(cases(i), q))
+        end do
+        call t%at_most('momentum-at-any-time-is-within-4-units', worst_m, 4.0_wp)
+        call t%at_most('attitude-at-any-time-is-within-4-units', worst_q, 4.0_wp)
+    end subroutine check_cases
+
+    !> Input that is refused; no momentum; periods that overflow or underflow.
+    subroutine check_refused(t)
+        type(tally), intent(inout) :: t
+        type(free_motion) :: motion
+        real(wp) :: m(3), q(4), ms(3, 4), qs(4, 4), nan
+        integer :: stat
+
+        nan = ieee_value(1.0_wp, ieee_quiet_nan)
+        motion = free_motion(rigid_body([-1.0_wp, 2.0_wp, 3.0_wp]), [0.4_wp, 0.7_wp, 0.4_wp], start)
         call motion%at(1.0_wp, m, q, stat)
         call t%equal('bad-body-is-refused', stat, status_bad_moments)
         motion = free_motion(rigid_body([1.0_wp, 2.0_wp, 3.0_wp]), [1.0_wp, nan, 0.0_wp], unit)
@@ -104,10 +125,7 @@ contains
         call motion%at(1.0_wp, m, q, stat)
         call t%ok('period-that-underflows-does-no-harm', stat == status_ok .and. .not. motion%periodic &
                   .and. all(ieee_is_finite(q)))
-        call check_precession(t)
-        call check_published_periods(t)
-        call t%close_suite()
-    end subroutine test_free_motion
+    end subroutine check_refused
 
     !> After the period m is back, and the attitude is turned about the momentum in space by the precession.
     subroutine check_period(t, moments, m0, name)
@@ -130,7 +148,7 @@ contains
                   all(abs(m - m0) <= tolerance*maxval(abs(m0))) .and. all(abs(change(2:4)) <= tolerance))
     end subroutine check_period
 
-    !> The precession is the way of the long axis round the momentum, followed from point to point.
+    !> The precession is the angle by which the long axis goes round the momentum, followed point by point.
     subroutine check_precession(t)
         type(tally), intent(inout) :: t
         type(free_motion) :: motion
@@ -174,7 +192,7 @@ contains
                   .and. .not. ieee_is_finite(motion%precession_period()))
     end subroutine check_precession
 
-    !> How far the precession is off the value by extrapolated integration in quadruple precision.
+    !> Error of the precession against the value by extrapolated integration in quadruple precision.
     function relative(moments, m0, expected) result(error)
         real(wp), intent(in) :: moments(3), m0(3), expected
         real(wp) :: error

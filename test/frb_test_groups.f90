@@ -79,7 +79,7 @@ contains
         end do
     end subroutine test_against_one
 
-    !> Rounding errors of a group are carried as those of one body are: a plain run is thousands of eps off.
+    !> Rounding errors of a group are carried over as those of one body: a plain run is thousands of eps off.
     subroutine test_compensated(t)
         type(tally), intent(inout) :: t
         type(rigid_body) :: body(n)
@@ -148,7 +148,7 @@ contains
                   seen%count == 4 .and. seen%step == 300)
         call t%close_to('group-observer-sees-the-end-as-it-is-returned', [seen%m, seen%q], [m, q], 0.0_wp)
         call t%close_to('group-observer-is-told-the-time', seen%t, 3.0_wp, 4*eps)
-        ! The same steps with carried rounding errors, shown to an observer or not, and back.
+        ! The same steps in a compensated run, with and without observer, and back.
         m = m_start
         q = q_start
         call integrate(body, splitting_scheme('srkn14'), scene, 0.01_wp, 300, m, q, compensated=.true.)

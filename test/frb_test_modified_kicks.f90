@@ -1,4 +1,4 @@
-!> Schemes whose kicks take the change of the torque along: orders seen with the scene's own change and with
+!> Schemes whose kicks contain the change of the torque: observed orders with the scene's own change and with
 !> displaced torques, one body and many, bodies by tensor, plans, long runs, refusals.
 module frb_test_modified_kicks
     use frb_checks, only: largest, tally, worst_of
@@ -19,8 +19,8 @@ module frb_test_modified_kicks
 
     public :: test_modified_kicks
 
-    !> A heavy top that tells its torque alone; counts how often it is asked. From `spoilt_from` on torques
-    !> that are asked for at another attitude than the one before are NaN.
+    !> A heavy top that provides its torque alone, and counts the calls. From the time `spoilt_from` on the
+    !> second torque at a time, that at a displaced attitude, is NaN.
     type, extends(body_scene) :: bare_top
         type(heavy_top) :: top
         integer :: asked = 0
@@ -76,8 +76,8 @@ contains
         call t%close_to('the-change-is-that-of-the-torque', change, (forth - back)/(2*small), 1.0e-9_wp)
     end subroutine test_change
 
-    !> Torque and g by one call against one after the other, a body in any axes; of an heir of the heavy top
-    !> its own torque.
+    !> Torque and its change g by one call against two calls, for a body in any axes; an extension of the
+    !> heavy top gets its own torque.
     subroutine test_both(t)
         type(tally), intent(inout) :: t
         real(wp), parameter :: response(3, 3) = reshape([1.4_wp, 0.2_wp, -0.3_wp, 0.2_wp, 0.9_wp, 0.1_wp, &
@@ -249,7 +249,7 @@ contains
         call t%close_to('fg6a-keeps-its-order-where-the-force-turns', seen, 6.0_wp, 0.3_wp)
     end subroutine test_time
 
-    !> The recipe of the plan, done by hand, is what `integrate` does.
+    !> A loop by hand, after the recipe of the plan, gives the result of `integrate`.
     subroutine test_plan(t)
         type(tally), intent(inout) :: t
         type(top_case) :: item
@@ -328,7 +328,7 @@ contains
         end do
     end subroutine test_long_runs
 
-    !> What cannot be done ends with its status and the state of the last whole step.
+    !> Runs that fail end with their status and the state of the last whole step.
     subroutine test_refused(t)
         type(tally), intent(inout) :: t
         type(top_case) :: item

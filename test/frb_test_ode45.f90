@@ -41,7 +41,7 @@ contains
             call quat_step(m, q, row(7), row(1:3), row(4:6), no_turn, stat=stat)
             if (stat /= 0) failures = failures + 1
             worst(3) = worst_of(worst(3), norm3(m - row(8:10))/norm3(row(4:6)))
-            ! Without a choice of sign: the quaternion is that of the continuous motion from q(0) = 1.
+            ! With its sign: the quaternion of the continuous motion from q(0) = 1.
             worst(4) = worst_of(worst(4), [abs(q - row(11:14))])
         end do
         close (unit)

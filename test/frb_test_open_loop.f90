@@ -1,4 +1,4 @@
-!> The open loop: loops of one's own against `integrate`, plans, times.
+!> The open loop: loops written by a user against `integrate`, plans, times.
 module frb_test_open_loop
     use frb_checks, only: tally, worst_of, largest
     use frb_free_flow, only: free_flow, rigid_body
@@ -33,8 +33,8 @@ contains
         call t%close_suite()
     end subroutine test_open_loop
 
-    !> The recipe of splitting_plan, one body and many, every scheme with plain kicks; the torque kept where
-    !> nothing moves.
+    !> The recipe of splitting_plan, one body and many, every scheme with plain kicks; the torque is kept
+    !> where the attitude does not change.
     subroutine test_own_loop(t)
         type(tally), intent(inout) :: t
         integer, parameter :: steps = 20
@@ -95,7 +95,7 @@ contains
         end do
     end subroutine test_own_loop
 
-    !> What a plan holds, and when there is none.
+    !> Contents of a plan; steps and schemes that have no plan.
     subroutine test_plans(t)
         type(tally), intent(inout) :: t
         type(splitting_scheme) :: scheme
@@ -138,7 +138,7 @@ contains
         call t%equal('a-plan-says-what-the-scheme-says', plan%status, status_bad_option)
     end subroutine test_plans
 
-    !> Times of steps, from any start, stay with start + steps*h; after 2**53 steps of h they stand.
+    !> Times of steps, from any start, equal start + steps*h; after 2**53 steps of h the time does not grow.
     subroutine test_times(t)
         type(tally), intent(inout) :: t
         real(wp), parameter :: starts(6) = [0.0_wp, 0.1_wp, -3.7_wp, 1.0e6_wp + 0.37_wp, -1.0e-3_wp, 0.062_wp]
@@ -164,7 +164,7 @@ contains
                   .and. abs(next_time(-1.0e-300_wp, 1.0e300_wp)) < huge(time))
     end subroutine test_times
 
-    !> What needs a quaternion of norm one refuses another; arrays that do not match.
+    !> Routines that need a quaternion of norm one refuse others; arrays that do not match.
     subroutine test_units_and_sizes(t)
         type(tally), intent(inout) :: t
         type(top_case) :: item

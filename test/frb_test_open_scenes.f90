@@ -25,13 +25,13 @@ module frb_test_open_scenes
         integer :: agreed = 0                   ! calls of the hook so far
         integer :: refuse_at = 0                ! torque that is refused
         integer :: others_refuse_at = 0         ! call of the hook at which another process refuses
-        integer :: last_code = 0                ! what the hook came with
+        integer :: last_code = 0                ! code in the last call of the hook
     contains
         procedure :: torque => shared_torque
         procedure :: agree => shared_agree
     end type shared_top
 
-    !> The same of dipoles.
+    !> Dipoles that count and refuse in the same way.
     type, extends(dipoles) :: shared_dipoles
         integer :: agreed = 0
         integer :: others_refuse_at = 0
@@ -107,7 +107,7 @@ contains
                 call integrate(item%body, scheme, scene, 0.05_wp, done, m_short, q_short, t=t_short)
                 good = good .and. stat == own_code .and. done < i .and. all(abs(m - m_short) <= 0.0_wp) &
                        .and. all(abs(q - q_short) <= 0.0_wp) .and. abs(time - t_short) <= 0.0_wp
-                ! Not a whole step more was possible: that one asks for the torque that is refused.
+                ! One step more is not possible: it needs the torque that is refused.
                 scene = shared_top(top=item%top)
                 call integrate(item%body, scheme, scene, 0.05_wp, done + 1, m_short, q_short)
                 good = good .and. scene%asked >= i - done*scheme%stages()
@@ -116,7 +116,7 @@ contains
         end do
     end subroutine test_refusing_scenes
 
-    !> The hook hears every code before it counts, and what it says ends the run.
+    !> The hook gets every code before it takes effect, and the code that it returns ends the run.
     subroutine test_agreeing(t)
         type(tally), intent(inout) :: t
         type(top_case) :: item
@@ -178,7 +178,7 @@ contains
         call t%ok('a-group-ends-where-another-process-refuses', good)
     end subroutine test_agreeing
 
-    !> Drifts of two steps as one: the same run to rounding, one drift less a step.
+    !> Drifts of two steps joined to one: the same run to rounding, one drift less in each step.
     subroutine test_joined(t)
         type(tally), intent(inout) :: t
         type(top_case) :: item
@@ -205,7 +205,7 @@ contains
             call integrate(item%body, scheme, item%top, 0.05_wp, 40, m_joined, q_joined, seen, every=8, &
                            joined=.true.)
             worst(2) = worst_of(worst(2), distance(m, q, seen%m(:, 6), seen%q(:, 6)))
-            ! Ended by a refusal it is closed: the state is that of a whole step.
+            ! A joined run that a refusal ends has made its last drift: the state is that of a whole step.
             scene = shared_top(top=item%top, refuse_at=37)
             m_joined = item%m0
             q_joined = item%q0

@@ -77,8 +77,8 @@ contains
                   .and. all(abs(ms - group_seen%m) <= 0.0_wp))
     end subroutine test_stopping
 
-    !> A run in pieces is the run in one, to the last bit: every scheme, plain and compensated, a torque that
-    !> depends on time.
+    !> A run in several calls equals the run in one call, to the last bit: every scheme, plain and
+    !> compensated, a torque that depends on time.
     subroutine test_restarted_runs(t)
         type(tally), intent(inout) :: t
         integer, parameter :: pieces(4) = [1, 13, 40, 17]
@@ -131,7 +131,7 @@ contains
 
     end subroutine test_restarted_runs
 
-    !> The same of groups.
+    !> Groups: a run in several calls equals the run in one call.
     subroutine test_restarted_groups(t)
         type(tally), intent(inout) :: t
         type(rigid_body) :: body(n)

@@ -1,5 +1,5 @@
-!> The methods the charts compare with: each reaches its order, the truth its digits. From the texts that the
-!> chart program compiles in double precision, here in quadruple precision, but those by a frame.
+!> The methods the charts compare with: each reaches its order, the truth its digits. All are compiled in
+!> quadruple precision from the files of the chart program, but the methods by a frame in double precision.
 module frb_test_rivals
     use frb_checks, only: tally, largest, worst_of
     use frb_double_frames, only: frame_steps
@@ -121,7 +121,7 @@ contains
         call t%at_most(name, largest(real([norm2(m - m_end), apart(q, q_end)], wp)), tolerance_truth*10)
     end subroutine end_values
 
-    !> What a heavy top conserves, in body terms: energy with V = u3, and u . m with u = Q^T u0.
+    !> Conserved quantities of a heavy top: the energy with V = u3, and u . m with u = Q^T u0.
     subroutine check_top(t)
         type(tally), intent(inout) :: t
         real(rk), parameter :: u0(3) = [0.3_rk, -0.2_rk, 0.9_rk]

@@ -27,7 +27,7 @@ contains
         call t%close_suite()
     end subroutine test_schemes
 
-    !> Every named scheme: what the table of frb_schemes says.
+    !> Every named scheme has the properties in the table of frb_schemes.
     subroutine test_named(t)
         type(tally), intent(inout) :: t
         ! strang, yoshida4, srkn6, s6, srkn11, srkn14, srkn17, aba864, aba1064, fg4, fg6a, fg6b, fg8
@@ -133,7 +133,8 @@ contains
         call t%equal('an-error-in-the-ninth-digit-lowers-the-order', report%nystroem_order, 2)
     end subroutine test_conditions
 
-    !> The third letter: Takahashi and Imada's scheme, whose kick takes the leading error of kicks away.
+    !> Modified kicks, the third letter of the words: Takahashi and Imada's scheme, whose kick removes the
+    !> leading error of kicks.
     subroutine test_modified(t)
         type(tally), intent(inout) :: t
         type(order_report) :: report

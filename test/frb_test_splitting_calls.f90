@@ -1,4 +1,4 @@
-!> `integrate` as it is called: scenes, observers, drifts, refused input.
+!> Calls of `integrate`: scenes, observers, drifts, refused input.
 module frb_test_splitting_calls
     use frb_checks, only: tally
     use frb_free_flow, only: rigid_body

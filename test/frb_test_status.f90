@@ -1,4 +1,4 @@
-!> Errors: every code has a message of its own, and what a routine says that stops without `stat`.
+!> Errors: every code has its own message, and a routine that stops without `stat` writes the right line.
 module frb_test_status
     use frb_checks, only: tally
     use frb_kinds, only: wp

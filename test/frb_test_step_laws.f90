@@ -132,7 +132,7 @@ contains
         call t%at_most('norm-of-the-quaternion-is-carried-along', worst(3), 0.0_wp)
     end subroutine check_scaling
 
-    !> A body whose axes are not the principal ones: steps in the axes `principal_axes` finds, and back.
+    !> A body whose axes are not principal: steps in the axes that `principal_axes` finds, and back.
     subroutine check_tensor(t, samples)
         type(tally), intent(inout) :: t
         type(sample), intent(in) :: samples(:)

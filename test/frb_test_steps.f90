@@ -117,7 +117,7 @@ contains
         type(tally), intent(inout) :: t
         character(*), intent(in) :: name
         real(wp), intent(in) :: moments(3), m0(3), time, m_end(3), q_end(4)
-        real(wp), intent(in) :: sensitivity     !! to the rounding of the steps, in roundings of the result
+        real(wp), intent(in) :: sensitivity     !! effect of rounding in the steps, in roundings of the result
         real(wp) :: m(3), q(4), a(3, 3)
         integer :: i
 

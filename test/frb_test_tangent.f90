@@ -3,7 +3,7 @@
 module frb_test_tangent
     use frb_checks, only: tally, largest, worst_of
     use frb_claims, only: tangent_median, tangent_rods, tangent_largest
-    use frb_flow_samples, only: no_turn, settled
+    use frb_flow_samples, only: no_turn, made_finite
     use frb_free_flow, only: flow_tangent, rigid_body
     use frb_kinds, only: wp
     use frb_reference_cases, only: reference_case, read_cases, score_momentum, score_attitude, median
@@ -39,13 +39,13 @@ contains
         call t%close_suite()
     end subroutine test_tangent
 
-    !> Medians and largest scores of all groups of a file; that there are so many.
+    !> Medians and largest scores of all groups of a file; the number of groups.
     subroutine check_groups(t, cases, label, columns, expected, medians)
         type(tally), intent(inout) :: t
         type(tangent_case), intent(in) :: cases(:)
         character(*), intent(in) :: label
         integer, intent(in) :: columns, expected
-        logical, intent(in) :: medians      !! scans of ten distances have none worth a bar
+        logical, intent(in) :: medians      !! check medians too; scans of ten distances have too few cases
         real(wp) :: score(size(cases), kinds), bar
         logical :: here(size(cases))
         integer :: i, k, groups
@@ -70,12 +70,12 @@ contains
         call t%equal('all-groups-are-there'//label, groups, expected)
     end subroutine check_groups
 
-    !> Cases in lanes, among neighbours of the file: their scores, that they agree with one body at a time,
-    !> and that it does not matter who stands beside them.
+    !> Cases in lanes beside their neighbours of the file: their scores, their agreement with one body at a
+    !> time, and that other neighbours do not change them.
     subroutine check_lanes(t, path, label)
         type(tally), intent(inout) :: t
         character(*), intent(in) :: path, label
-        integer, parameter :: n = 70    ! whole blocks and a rest
+        integer, parameter :: n = 70    ! whole blocks and six more bodies
         type(tangent_case), allocatable :: cases(:)
         real(wp) :: m(3, n), q(4, n), transition(6, 6, n), m_one(3), q_one(4), one(6, 6), worst(2), apart, &
             moved
@@ -92,7 +92,7 @@ contains
         moved = 0.0_wp
         do i = 1, size(cases)
             do k = 1, 2
-                lane = 1 + mod(7*i + 29*k, 64)     ! those of the rest go one by one
+                lane = 1 + mod(7*i + 29*k, 64)     ! the last six bodies move one by one
                 do j = 1, n
                     m(:, j) = cases(1 + modulo(i - 1 + k*(j - lane), size(cases)))%m0
                     q(:, j) = no_turn
@@ -135,9 +135,9 @@ contains
             m_alone = m
             call flow_tangent(rigid_body(cases(i)%moments), cases(i)%h, m, q, phi)
             call flow_tangent(rigid_body(cases(i)%moments), cases(i)%h, m_alone, jacobian)
-            worst = worst_of(worst, [score_momentum(cases(i), settled(m)), &
-                                     score_attitude(cases(i), settled(q)), &
-                                     score_momentum(cases(i), settled(m_alone))])
+            worst = worst_of(worst, [score_momentum(cases(i), made_finite(m)), &
+                                     score_attitude(cases(i), made_finite(q)), &
+                                     score_momentum(cases(i), made_finite(m_alone))])
         end do
         call t%at_most('momentum-as-free-flow', worst(1), 2.0_wp)
         call t%at_most('attitude-as-free-flow', worst(2), 2.0_wp)
@@ -162,7 +162,7 @@ contains
         call flow_tangent(it%body, it%h, m, jacobian)
         score(5) = score_matrix(jacobian, it%jacobian, it%sensitivity(1))
         if (abs(it%h) > 0.0_wp) return
-        ! No step: the exact derivatives by m and I are 0, those of the file rounding of its many digits.
+        ! No step: the exact derivatives by m and I are 0, those in the file are rounding of its many digits.
         if (all(abs(transition(4:6, 1:3)) <= 0.0_wp) .and. all(abs(by_inertia) <= 0.0_wp)) score(2:4) = 0.0_wp
     end subroutine score_case
 

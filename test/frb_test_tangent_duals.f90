@@ -1,4 +1,4 @@
-!> flow_tangent against the closed form of the step differentiated by machine, in dual numbers.
+!> flow_tangent against automatic derivatives of the closed form of the step, in dual numbers.
 module frb_test_tangent_duals
     use frb_checks, only: tally, worst_of
     use frb_dual_flow, only: dual_step, points

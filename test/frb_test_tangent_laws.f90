@@ -1,5 +1,5 @@
-!> Laws that the derivatives of the exact step obey: Poisson map, conserved quantities, scaling, group, and
-!> what they are where a formula could fail.
+!> Laws that the derivatives of the exact step obey: Poisson map, conserved quantities, scaling, group; and
+!> their values where a formula could fail.
 module frb_test_tangent_laws
     use frb_checks, only: tally, largest, worst_of
     use frb_flow_samples, only: stream, no_turn, no_rotation
@@ -19,8 +19,7 @@ module frb_test_tangent_laws
 
     real(wp), parameter :: eps = epsilon(1.0_wp)
 
-    !> Largest residuals, in units of 2^-53 of the norms involved: twice those of a first version on 1306
-    !> cases.
+    !> Largest residuals, in units of 2^-53 of the norms involved: twice those measured on 1306 cases.
     integer, parameter :: laws = 12
     character(*), parameter :: law_names(laws) = [character(40) :: 'J-m^-J^T-is-m''^', 'm''^T-J-is-m^T', &
         'J-keeps-the-energy', 'determinant-of-J-is-1', 'J-is-E-and-m''^-W', 'E^T-W-W^T-E-is-W^T-m''^-W', &
@@ -66,7 +65,7 @@ contains
         end do
     end subroutine check_identities
 
-    !> Residuals of one case in units of 2^-53; 1e30 for what is not a number; none where J^2 overflows.
+    !> Residuals of one case in units of 2^-53; 1e30 for NaN; 0 where J^2 overflows.
     function residuals(it) result(r)
         type(tangent_case), intent(in) :: it
         real(wp) :: r(laws)
@@ -287,7 +286,7 @@ contains
         call t%equal('rotor-does-not-spin', code, status_bad_momentum)
     end subroutine check_rotor
 
-    !> What is refused, and what comes back then.
+    !> Input that is refused, and the results of a refused call.
     subroutine check_refusals(t)
         type(tally), intent(inout) :: t
         type(rigid_body) :: body
@@ -321,7 +320,7 @@ contains
         call t%at_most('columns-of-moments-and-of-a-tensor-agree', difference_of_columns(), 0.0_wp)
     end subroutine check_refusals
 
-    !> Derivatives by the moments as such and as the diagonal of a tensor.
+    !> Derivatives by the moments of a body, against those by the diagonal of its tensor.
     function difference_of_columns() result(difference)
         real(wp) :: difference
         real(wp) :: m(3), q(4), phi(6, 6), by_moments(6, 3), by_tensor(6, 6)

@@ -62,7 +62,7 @@ contains
         product = identity
         do step = 1, 100000
             call flow_tangent(body, 0.01_wp, m, q, phi)
-            ! As increments: a step is close to 1, and the rounding of products would exceed its own.
+            ! As increments: phi is close to 1, and a product of such matrices would round more than they do.
             product = product + matmul(phi - identity, product)
         end do
         residual = norm2(matmul(transpose(product), matmul(structure(m), product)) - structure(m0)) &
@@ -74,8 +74,8 @@ contains
         call t%at_most('1e5-steps-are-one', norm2(product - phi)/norm2(phi), 1.0e-11_wp)
     end subroutine check_composition
 
-    !> Where axes are almost aligned, what they mix in is less than the rounding of the momentum: |m| wanders
-    !> and does not drift. See the suite `drifts`.
+    !> Nearly principal axes: the rotation to principal axes changes the momentum by less than its rounding.
+    !> |m| wanders and does not drift. See the suite `drifts`.
     subroutine check_almost_aligned(t)
         type(tally), intent(inout) :: t
         integer, parameter :: steps = 30000

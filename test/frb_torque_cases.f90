@@ -1,4 +1,4 @@
-!> Scenes, observers and drifts the suites of the torque layer share, and tops with known end values.
+!> Scenes, observers and drifts for the suites of the torque layer, and tops with known end values.
 module frb_torque_cases
     use frb_free_flow, only: free_flow, rigid_body
     use frb_kinds, only: wp
@@ -67,7 +67,7 @@ module frb_torque_cases
         procedure :: torque => spoilt
     end type spoilt_torque
 
-    !> The free flow again, as a drift of the user's.
+    !> The free flow as a drift written by a user.
     type, extends(body_drift) :: plain_drift
     contains
         procedure :: advance => advance_plainly
@@ -79,7 +79,7 @@ module frb_torque_cases
         procedure :: advance => advance_tilting
     end type tilting_drift
 
-    !> A drift that gives up.
+    !> A drift that fails.
     type, extends(body_drift) :: failing_drift
     contains
         procedure :: advance => give_up

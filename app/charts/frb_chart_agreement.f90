@@ -9,7 +9,7 @@ module frb_chart_agreement
 
     public :: chart_agreement
 
-    !> Ratios, and the quotient of two of them, are within this of each other or do not agree.
+    !> Two ratios agree if they differ by no more than this part of the smaller one.
     real(wp), parameter :: allowed = 0.15_wp
     !> The column of the cost table with the median of the time relative to the cheapest Moser-Veselov.
     integer, parameter :: relative = 5

@@ -47,7 +47,7 @@ contains
     !> The numbers of the chart, table(column, method, step).
     subroutine measure_cost(options, what, methods, table)
         type(settings), intent(in) :: options
-        character(*), intent(in) :: what        !! is measured, for the progress on the terminal
+        character(*), intent(in) :: what        !! name of the measurement, for the progress on the terminal
         type(method), intent(in) :: methods(:)
         real(wp), allocatable, intent(out) :: table(:, :, :)
         type(workload), allocatable :: works(:)
@@ -182,7 +182,7 @@ contains
         call table_of_long_steps(options)
     end subroutine chart_speed
 
-    !> Time of one step of any length against that of steps the series reach, in one run.
+    !> Time of one step of any length, and its ratio to the time of a step of 1 rad in the same run.
     subroutine table_of_long_steps(options)
         type(settings), intent(in) :: options
         real(wp), parameter :: all_steps(*) = [0.001_wp, 0.1_wp, 1.0_wp, 10.0_wp, 1.0e2_wp, 1.0e3_wp, &

@@ -1,4 +1,4 @@
-!> Part of the table `torque-cost`: its rows, and what many dipoles cost, which see each other.
+!> Part of the table `torque-cost`: how a row is written, and the cost of many interacting dipoles.
 module frb_chart_dipoles
     use frb, only: wp, rigid_body, free_flow, group_scene, integrate, quat_conjugate, quat_rotate, &
         splitting_scheme, status_ok
@@ -9,8 +9,8 @@ module frb_chart_dipoles
 
     public :: cost_of_dipoles, row
 
-    !> Dipoles along axis 3 of bodies at the points of a square lattice, in each other's field; this is the
-    !> N^2 part with nothing else in it.
+    !> Dipoles along axis 3 of bodies at the points of a square lattice, in each other's field: the N^2 part
+    !> of a scene, without anything else.
     type, extends(group_scene) :: lattice
         integer :: side = 1
     contains

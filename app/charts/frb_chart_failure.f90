@@ -1,18 +1,18 @@
-!> The chart `failure`: error, in units of what rounding the inputs costs anyone, against closeness to every
-!> place where methods are known to fail, one panel each.
+!> The chart `failure`: error, in units of the inherent sensitivity (the error caused by rounding the input),
+!> against closeness to every place where methods are known to fail, one panel each.
 module frb_chart_failure
     use frb, only: wp
-    use frb_chart_methods, only: method, catalogue, style, family_momentum, family_dp, family_frames
+    use frb_chart_methods, only: method, methods_without, style, family_momentum, family_dp, family_frames
     use frb_chart_output, only: chart_file, width, settings, open_table, open_script, draw, progress, &
-        quantile, say, either, &
-        uniform, random_direction
+        quantile, say, either, uniform, random_direction
     use frb_chart_truth, only: free_case, new_case, add_sensitivity, errors_of
     use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
     public :: chart_failure
-    public :: panels, names, titles, distances, new_failure_case, failed    ! for the chart `tangent`
+    public :: panels, names, distances, new_failure_case, failed    ! for the chart `tangent`
+    public :: begin_panels, begin_panel, begin_legend
 
     integer, parameter :: panels = 9
     character(*), parameter :: names(panels) = [character(12) :: 'separatrix', 'axis-1', 'axis-2', 'axis-3', &
@@ -21,10 +21,10 @@ module frb_chart_failure
         'distance to axis 1 (stable)', 'distance to axis 2 (unstable)', 'distance to axis 3 (stable)', &
         '1 - I_1/I_2  (symmetric body)', '1 - I_2/I_3  (symmetric body)', '1 - I_1/I_3  (sphere)', &
         'distance to m = (0, 0, -1), m_1 = 0', 'step h']
-    !> Drawn where a method gives NaN, Inf or a refusal.
+    !> The score of a method that gives NaN or Inf, or refuses.
     real(wp), parameter :: failed = 1.0e18_wp
     real(wp), parameter :: floor_of_scores = 1.0e-2_wp
-    !> The approximate methods take steps of this angle, at most so many.
+    !> The approximate methods take steps of this angle [rad], at most `most_steps`.
     real(wp), parameter :: small_step = 0.02_wp
     real(wp), parameter :: most_steps = 2.0e4_wp
 
@@ -91,18 +91,8 @@ contains
 
     function chosen() result(kept)
         type(method), allocatable :: kept(:)
-        type(method), allocatable :: methods(:)
-        logical, allocatable :: keep(:)
-        integer :: i
 
-        allocate (methods, source=catalogue())
-        allocate (keep(size(methods)))
-        do i = 1, size(methods)
-            keep(i) = all(methods(i)%family /= [family_momentum, family_frames])
-            if (methods(i)%family == family_dp) keep(i) = methods(i)%key == 'dp-15' &
-                .or. methods(i)%key == 'dp-9'
-        end do
-        allocate (kept, source=pack(methods, keep))
+        allocate (kept, source=methods_without([family_momentum, family_frames], ['dp-15', 'dp-9 ']))
     end function chosen
 
     !> The distances of a panel, down to 0; for the last panel the steps.
@@ -119,7 +109,7 @@ contains
         end if
     end function distances
 
-    !> A random case of a panel: the same for every distance but for the distance itself.
+    !> A random case of a panel. All distances have the same cases but for the distance itself.
     function new_failure_case(panel, distance, number) result(item)
         integer, intent(in) :: panel
         real(wp), intent(in) :: distance
@@ -207,28 +197,11 @@ contains
         integer :: p, i, j, entries
 
         call open_script(options, 'failure', 1000, 1080, file)
-        call file%put('set multiplot title "Largest error of '//either(options%quick, '2', '7')// &
-            ' random cases; 1 unit: what rounding the inputs costs anyone"')
-        call file%put_lines([character(width) :: 'set logscale xy', 'set format y "10^{%T}"', &
-            'set yrange [5e-3:1e19]', 'set ytics 1,1e4', 'set ytics add ("NaN" 1e18)', 'unset key', &
-            'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0', 'set size 0.25,0.195'])
+        call begin_panels(file, 'Largest error of '//either(options%quick, '2', '7')// &
+                          ' random cases; 1 unit: what rounding the inputs costs anyone')
         do p = 1, panels
-            if (p == 9) then
-                call file%put_lines([character(width) :: 'set xrange [3e-9:3e8]', &
-                    'set xtics ("10^{-8}" 1e-8, "10^{-4}" 1e-4, "1" 1, '//'"10^4" 1e4, "10^8" 1e8)'])
-            else
-                call file%put_lines([character(width) :: 'set xrange [0.3:3e-18]', &
-                    'set xtics ("0" 1e-17, "10^{-15}" 1e-15, "10^{-10}" 1e-10, "10^{-5}" 1e-5, '// &
-                    '"10^{-1}" 1e-1)'])
-            end if
-            write (file%line, '(a,f6.4,a,f6.4)') 'set origin ', 0.075 + 0.315*mod(p - 1, 3), ',', &
-                0.74 - 0.26*((p - 1)/3)
-            call file%put()
-            call file%put(either(mod(p, 3) == 1, 'set ylabel "error  [units]" offset 1.2,0', &
-                'unset ylabel'))
-            call file%put('set title "'//trim(titles(p))//'" offset 0,-0.7')
-            call file%put_lines([character(width) :: 'plot \', &
-                '  4 with filledcurves y1=1e-3 lc rgb "#eeeeee" notitle, \'])
+            call begin_panel(file, p, [character(80) :: 'set xrange [3e-9:3e8]', &
+                'set xtics ("10^{-8}" 1e-8, "10^{-4}" 1e-4, "1" 1, "10^4" 1e4, "10^8" 1e8)'])
             do j = 1, size(shown)
                 do i = 1, size(methods)
                     if (methods(i)%key == shown(j)) then
@@ -240,12 +213,7 @@ contains
             end do
             call file%put('  NaN notitle')
         end do
-        call file%put_lines([character(width) :: &
-            'set origin 0.03,0.005', 'set size 0.94,0.16', 'unset border', 'unset tics', &
-            'unset ylabel', 'unset title', 'unset grid', 'unset logscale', 'set xrange [0:1]', &
-            'set yrange [0:1]', &
-            'set key center center maxrows 4 samplen 2.2 width -4 spacing 1.2 Left reverse', &
-            'plot NaN with boxes fs solid noborder lc rgb "#eeeeee" title "up to 4 units", \'])
+        call begin_legend(file, 'maxrows 4 samplen 2.2 width -4 spacing 1.2')
         entries = 0
         do j = size(shown), 1, -1
             do i = 1, size(methods)
@@ -259,5 +227,49 @@ contains
         call file%finish()
         call draw(options, 'failure')
     end subroutine draw_failure
+
+    !> The settings that all panels share, under one title.
+    subroutine begin_panels(file, title)
+        type(chart_file), intent(inout) :: file
+        character(*), intent(in) :: title
+
+        call file%put('set multiplot title "'//title//'"')
+        call file%put_lines([character(width) :: 'set logscale xy', 'set format y "10^{%T}"', &
+            'set yrange [5e-3:1e19]', 'set ytics 1,1e4', 'set ytics add ("NaN" 1e18)', 'unset key', &
+            'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0', 'set size 0.25,0.195'])
+    end subroutine begin_panels
+
+    !> Place, axes and title of a panel, and the band up to 4 units as the first curve of its plot.
+    subroutine begin_panel(file, panel, axis_of_steps)
+        type(chart_file), intent(inout) :: file
+        integer, intent(in) :: panel
+        character(*), intent(in) :: axis_of_steps(:)    !! range and tics of x in the last panel
+
+        if (panel == panels) then
+            call file%put_lines(axis_of_steps)
+        else
+            call file%put_lines([character(width) :: 'set xrange [0.3:3e-18]', &
+                'set xtics ("0" 1e-17, "10^{-15}" 1e-15, "10^{-10}" 1e-10, "10^{-5}" 1e-5, "10^{-1}" 1e-1)'])
+        end if
+        write (file%line, '(a,f6.4,a,f6.4)') 'set origin ', 0.075 + 0.315*mod(panel - 1, 3), ',', &
+            0.74 - 0.26*((panel - 1)/3)
+        call file%put()
+        call file%put(either(mod(panel, 3) == 1, 'set ylabel "error  [units]" offset 1.2,0', 'unset ylabel'))
+        call file%put('set title "'//trim(titles(panel))//'" offset 0,-0.7')
+        call file%put_lines([character(width) :: 'plot \', &
+            '  4 with filledcurves y1=1e-3 lc rgb "#eeeeee" notitle, \'])
+    end subroutine begin_panel
+
+    !> The legend below all panels, and its entry for the band up to 4 units.
+    subroutine begin_legend(file, layout)
+        type(chart_file), intent(inout) :: file
+        character(*), intent(in) :: layout
+
+        call file%put_lines([character(width) :: &
+            'set origin 0.03,0.005', 'set size 0.94,0.16', 'unset border', 'unset tics', 'unset ylabel', &
+            'unset title', 'unset grid', 'unset logscale', 'set xrange [0:1]', 'set yrange [0:1]', &
+            'set key center center '//layout//' Left reverse', &
+            'plot NaN with boxes fs solid noborder lc rgb "#eeeeee" title "up to 4 units", \'])
+    end subroutine begin_legend
 
 end module frb_chart_failure

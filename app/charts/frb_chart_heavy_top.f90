@@ -161,13 +161,13 @@ contains
     end subroutine draw_errors
 
     !> How a solver's line looks.
-    function curve(one) result(clause)
-        type(solver), intent(in) :: one
+    function curve(which) result(clause)
+        type(solver), intent(in) :: which
         character(:), allocatable :: clause
         character(80) :: text
 
-        write (text, '(4(a,i0),a)') ' with linespoints lt ', one%colour, ' dt ', one%dash, ' pt ', &
-            one%symbol, ' lw ', one%width, ' ps 0.6'
+        write (text, '(4(a,i0),a)') ' with linespoints lt ', which%colour, ' dt ', which%dash, ' pt ', &
+            which%symbol, ' lw ', which%width, ' ps 0.6'
         clause = trim(text)
     end function curve
 
@@ -219,9 +219,9 @@ contains
         call draw(options, 'heavy-top-energy')
     end subroutine chart_energy
 
-    subroutine follow_energy(file, one, top, setting, longest, seconds)
+    subroutine follow_energy(file, which, top, setting, longest, seconds)
         type(chart_file), intent(inout) :: file
-        type(solver), intent(in) :: one
+        type(solver), intent(in) :: which
         type(top_at_start), intent(in) :: top
         real(wp), intent(in) :: setting, longest
         real(wp), intent(out) :: seconds
@@ -234,7 +234,7 @@ contains
         body = rigid_body(top%moments)
         scene%force = top%force
         energy = total_energy(body, scene, 0.0_wp, top%m0, top%q0)
-        call file%put('# '//name_of(one))
+        call file%put('# '//name_of(which))
         moving = top
         worst = 1.0e-17_wp
         now = 0.0_wp
@@ -243,7 +243,7 @@ contains
             next = max(longest**(real(k, wp)/samples), now + 1)
             ! Whole steps of 4, which all steps divide.
             next = now + 4*ceiling((next - now)/4)
-            call run_solver(one, moving, next - now, setting, 1, m, q, part, torques)
+            call run_solver(which, moving, next - now, setting, 1, m, q, part, torques)
             now = next
             seconds = seconds + part
             moving%m0 = m

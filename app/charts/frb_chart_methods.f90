@@ -10,8 +10,8 @@ module frb_chart_methods
     implicit none
     private
 
-    public :: method, catalogue, find_method, known, style, escaped, advance, advance_once, constants, &
-        new_constants
+    public :: method, catalogue, methods_without, find_method, known, style, escaped, advance, advance_once, &
+        constants, new_constants
     public :: family_flow, family_batch, family_momentum, family_matrix, family_paper_q, family_paper_a
     public :: family_dmv, family_rotations, family_rk4, family_dp, family_frames
 
@@ -41,7 +41,7 @@ module frb_chart_methods
         integer :: width = 2
     end type method
 
-    !> What the free flow and the discrete Moser-Veselov method form once per body.
+    !> The constants that the free flow and the discrete Moser-Veselov method form once per body.
     type :: constants
         type(rigid_body) :: body
         type(dmv_body) :: rival
@@ -67,7 +67,7 @@ contains
 
         ! Colours: the free flow vermilion, the paper's exact steps green, its semi-exact ones purple,
         ! discrete Moser-Veselov blue, rotations orange, Runge-Kutta black and grey; dash and symbol tell
-        ! the rest.
+        ! methods of one colour apart.
         allocate (methods(0))
         call add('flow', 'free flow', family_flow, 0, 0, 2, 1, 7, 4)
         call add('flow-batch', 'free flow, batch', family_batch, 0, 0, 2, 2, 5, 3)
@@ -130,6 +130,24 @@ contains
         end subroutine add
 
     end function catalogue
+
+    !> The catalogue without some families. Of the adaptive method, only the tolerances with these keys.
+    function methods_without(families, adaptive_keys) result(kept)
+        integer, intent(in) :: families(:)
+        character(*), intent(in) :: adaptive_keys(:)
+        type(method), allocatable :: kept(:)
+        type(method), allocatable :: methods(:)
+        logical, allocatable :: keep(:)
+        integer :: i
+
+        allocate (methods, source=catalogue())
+        allocate (keep(size(methods)))
+        do i = 1, size(methods)
+            keep(i) = all(methods(i)%family /= families)
+            if (methods(i)%family == family_dp) keep(i) = any(methods(i)%key == adaptive_keys)
+        end do
+        allocate (kept, source=pack(methods, keep))
+    end function methods_without
 
     !> The method of the catalogue with this key; stops when there is none.
     function find_method(key) result(found)
@@ -202,7 +220,7 @@ contains
         real(wp), intent(inout) :: q(4)         !! attitude, body to space
         real(wp), intent(out), optional :: a(3, 3)  !! attitude matrix as the method left it, if it has one
         type(constants), intent(in), optional :: ready  !! of the body, formed here when absent
-        type(constants), allocatable :: own     ! allocatable: default values take longer than a step
+        type(constants), allocatable :: own     ! allocatable: setting default values takes longer than a step
         real(wp) :: matrix(3, 3)
         integer :: stat
 

@@ -1,6 +1,6 @@
-!> What every chart shares: tables with a header that says where they come from, pictures through gnuplot,
+!> Parts that all charts share: tables with a header that says where they come from, pictures through gnuplot,
 !> progress on a terminal, medians and reproducible random numbers. A file that cannot be written ends the
-!> program; what has its name is complete.
+!> program; a file gets its name only when it is complete.
 module frb_chart_output
     use frb, only: wp
     use frb_out_files, only: out_file
@@ -17,7 +17,7 @@ module frb_chart_output
     !> Longest line of a table or a script.
     integer, parameter :: width = 400
 
-    !> What the command line asks for.
+    !> The options of the command line.
     type :: settings
         logical :: quick = .false.
         logical :: terminal = .false.               !! standard error is a terminal: show progress
@@ -26,7 +26,7 @@ module frb_chart_output
 
     !> A table or a script that is being written.
     type, extends(out_file) :: chart_file
-        character(width) :: line            !! what `put` writes
+        character(width) :: line            !! the line that `put` without text writes
     contains
         procedure :: begin
         procedure :: put
@@ -74,7 +74,7 @@ contains
         end do
     end subroutine put_lines
 
-    !> Ends a block of a table, as gnuplot counts them.
+    !> Ends a block of a table: gnuplot separates blocks by two blank lines.
     subroutine end_block(self)
         class(chart_file), intent(inout) :: self
 
@@ -107,7 +107,7 @@ contains
         call file%put('# columns: '//columns)
     end subroutine open_table
 
-    !> Opens the gnuplot script FOLDER/NAME.gp and writes what every script begins with: an SVG of the given
+    !> Opens the gnuplot script FOLDER/NAME.gp and writes the common head of all scripts: an SVG of the given
     !> size (a PNG when called as `gnuplot -e "format='png'" NAME.gp`), one font, colours as line types.
     subroutine open_script(options, name, across, height, file)
         type(settings), intent(in) :: options
@@ -152,7 +152,7 @@ contains
                 '.gp: not drawn, there is no gnuplot; table and script are kept')
             return
         end if
-        ! gnuplot does not tell when the disk is full: what it made gets its name if it is whole.
+        ! gnuplot does not report a full disk: the picture gets its name only if it is complete.
         write (process, '(i0)') c_getpid()
         part = 'frb-'//trim(process)//'.part'
         call execute_command_line('cd '''//options%folder//''' && { gnuplot -e "picture='''//part//'''" '// &

@@ -2,11 +2,10 @@
 !> (error against the number of steps the same time is cut into).
 module frb_chart_precision
     use frb, only: wp
-    use frb_chart_methods, only: method, catalogue, style, family_flow, family_batch, family_momentum, &
-        family_matrix, family_dp, family_paper_a, family_paper_q
+    use frb_chart_methods, only: method, methods_without, style, family_flow, family_batch, &
+        family_momentum, family_matrix, family_dp, family_paper_a, family_paper_q
     use frb_chart_output, only: chart_file, width, settings, open_table, open_script, draw, progress, &
-        either, &
-        quantile, uniform, random_direction
+        either, quantile, uniform, random_direction
     use frb_chart_timing, only: workload, new_workload, time_in_turn
     use frb_chart_truth, only: free_case, new_case, errors_of
     use, intrinsic :: iso_fortran_env, only: int64
@@ -15,7 +14,7 @@ module frb_chart_precision
 
     public :: chart_work_precision, chart_growth
 
-    !> Errors are drawn from here up: a result that is right to the last bit has none.
+    !> Smallest error drawn: a result that is right to the last bit has the error 0.
     real(wp), parameter :: floor_of_errors = 1.0e-17_wp
 
     type :: point
@@ -57,21 +56,12 @@ contains
         call draw_work_precision(options, methods, names, bodies)
     end subroutine chart_work_precision
 
-    !> The methods of these charts; the tolerances of the adaptive one make one curve.
+    !> The methods of these charts; the tolerances of the adaptive method make one curve.
     function curves() result(chosen)
         type(method), allocatable :: chosen(:)
-        type(method), allocatable :: methods(:)
-        logical, allocatable :: keep(:)
         integer :: i
 
-        allocate (methods, source=catalogue())
-        allocate (keep(size(methods)))
-        do i = 1, size(methods)
-            keep(i) = methods(i)%family /= family_momentum &
-                .and. methods(i)%family /= family_matrix
-            if (methods(i)%family == family_dp) keep(i) = methods(i)%key == 'dp-12'
-        end do
-        allocate (chosen, source=pack(methods, keep))
+        allocate (chosen, source=methods_without([family_momentum, family_matrix], ['dp-12']))
         do i = 1, size(chosen)
             if (chosen(i)%family == family_dp) then
                 chosen(i)%key = 'dp'
@@ -80,7 +70,7 @@ contains
         end do
     end function curves
 
-    !> The methods that are drawn; the others, which lie on top of these, are in the tables.
+    !> The methods that are drawn; the others, whose curves lie on top of these, are in the tables only.
     elemental function drawn(with) result(yes)
         type(method), intent(in) :: with
         logical :: yes
@@ -143,7 +133,7 @@ contains
         end do
     end subroutine measure
 
-    !> The blocks of a table, and at its end the envelope: points that no other beats in both respects.
+    !> The blocks of a table, and at its end the envelope: points that no other point beats in time and error.
     subroutine write_points(file, methods, points, counts)
         type(chart_file), intent(inout) :: file
         type(method), intent(in) :: methods(:)
@@ -312,7 +302,7 @@ contains
         call draw(options, 'growth')
     end subroutine chart_growth
 
-    !> The adaptive method has no number of steps to set; the batch is the free flow over again.
+    !> The adaptive method has no number of steps to set; the batch repeats the free flow.
     pure function left_out(with) result(yes)
         type(method), intent(in) :: with
         logical :: yes

@@ -1,5 +1,5 @@
-!> The table `heavy-top-ratios`: time that a heavy top takes to an error of its attitude, and ratios of such
-!> times, those of one row from one run, the solvers in turn.
+!> The table `heavy-top-ratios`: time that solvers need for a given error of the attitude of a heavy top, and
+!> ratios of these times. One run gives all times of a row, the solvers in turn.
 module frb_chart_ratios
     use frb, only: wp
     use frb_chart_output, only: chart_file, settings, open_table, progress
@@ -82,16 +82,16 @@ contains
     end subroutine race
 
     !> The k-th of the finer settings: a tolerance, or a step.
-    pure function finer_setting(one, top, k) result(setting)
-        type(solver), intent(in) :: one
+    pure function finer_setting(which, top, k) result(setting)
+        type(solver), intent(in) :: which
         type(top_at_start), intent(in) :: top
         integer, intent(in) :: k
         real(wp) :: setting
 
-        if (one%drift == '') then
+        if (which%drift == '') then
             setting = 10.0_wp**(-0.25_wp*(k - 1))
         else
-            setting = setting_of(one, top, 1)*1.08_wp**(1 - k)
+            setting = setting_of(which, top, 1)*1.08_wp**(1 - k)
         end if
     end function finer_setting
 
@@ -109,8 +109,8 @@ contains
         call file%put()
     end subroutine row
 
-    !> Time to an error: of the settings that none is both faster and better than, the two around it,
-    !> interpolated on logarithmic scales; NaN where no setting gets below it.
+    !> Time to an error: interpolated on logarithmic scales between the fastest setting that reaches the error
+    !> and the best of all faster settings; NaN where no setting reaches it.
     pure function time_to(wanted, errors, times) result(time)
         real(wp), intent(in) :: wanted, errors(:), times(:)
         real(wp) :: time

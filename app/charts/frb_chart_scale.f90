@@ -38,11 +38,11 @@ contains
         do k = 1, counts
             n = 10**(k - 1)
             work = new_workload(find_method('flow'), moments, m0, h, n)
-            ! On the wall with threads: those that wait for work would count as processor time.
+            ! The wall clock with threads: processor time would count threads that wait for work.
             work%by_the_wall = two
             do i = 1, curves
                 if (threads(i) > 1 .and. (.not. two .or. n < 1000)) cycle
-                call set(i)
+                call choose_curve(i)
                 work%nsteps = 1
                 do
                     if (run(work) > merge(0.5e-3_wp, 2.0e-3_wp, options%quick)) exit
@@ -53,7 +53,7 @@ contains
             do r = 1, repetitions
                 do i = 1, curves
                     if (threads(i) > 1 .and. (.not. two .or. n < 1000)) cycle
-                    call set(i)
+                    call choose_curve(i)
                     work%nsteps = steps(i)
                     ns(r, i, k) = 1.0e9_wp*run(work)/(real(steps(i), wp)*n)
                 end do
@@ -88,12 +88,12 @@ contains
 
     contains
 
-        subroutine set(curve)
+        subroutine choose_curve(curve)
             integer, intent(in) :: curve
 
             work%with = find_method(trim(keys(curve)))
             work%threads = threads(curve)
-        end subroutine set
+        end subroutine choose_curve
 
         subroutine draw_scale()
             type(method) :: with

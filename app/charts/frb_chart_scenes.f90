@@ -88,12 +88,12 @@ contains
             scene('loose-short-steps', general, m, 1.0_wp, 1.0e-3_wp, steps=100)])
     end function all_scenes
 
-    !> Adds every method that can play the scene, with the work it is.
+    !> Adds every method that can play the scene, with its workload.
     subroutine enter(what, works, attempts, n)
         type(scene), intent(in) :: what
         type(workload), intent(inout) :: works(:)
         type(attempt), intent(inout) :: attempts(:)
-        integer, intent(inout) :: n             !! works and attempts so far
+        integer, intent(inout) :: n             !! number of works and attempts so far
         type(method), allocatable :: methods(:)
         type(free_case) :: item
         real(wp) :: error
@@ -142,8 +142,8 @@ contains
         end do
     end subroutine write_rows
 
-    !> The fewest steps, of 1, 2, 4, ..., with which the method stays within the bound, or the steps of the
-    !> scene when they do; 0 if none.
+    !> The fewest steps, of 1, 2, 4, ..., with which the method stays within the bound. A scene with a number
+    !> of steps allows this number only. 0 if the method does not stay within the bound.
     subroutine fewest_steps(with, what, item, steps, error)
         type(method), intent(in) :: with
         type(scene), intent(in) :: what

@@ -1,6 +1,6 @@
-!> What the charts of heavy tops compare: splittings by scheme and drift, the extrapolated splitting, and two
-!> solvers of the plain equations, each with nine settings from coarse to fine. With the free flow two drifts
-!> between steps are made as one (`joined`), as they are in a run that nobody watches.
+!> The solvers of heavy tops that the charts compare: splittings by scheme and drift, the extrapolated
+!> splitting, and two solvers of the plain equations, each with nine settings from coarse to fine. With the
+!> free flow the last drift of a step and the first of the next are made as one (`joined`).
 module frb_chart_solvers
     use frb, only: wp, rigid_body, splitting_scheme, heavy_top, body_drift, body_scene, integrate, &
         extrapolate, extrapolation_report, status_ok
@@ -24,7 +24,7 @@ module frb_chart_solvers
         integer :: colour = 1, dash = 1, symbol = 7, width = 2
     end type solver
 
-    !> A heavy top at its start, and the steps a solver of order 14 needs for 1e-9, about.
+    !> A heavy top at its start, and the step with which a solver of order 14 has an error of about 1e-9.
     type :: top_at_start
         character(8) :: name = ''
         character(60) :: title = ''
@@ -33,7 +33,7 @@ module frb_chart_solvers
         real(wp) :: q0(4) = start_q
     end type top_at_start
 
-    !> A heavy top that tells its torque one attitude at a time.
+    !> A heavy top that gives its torque for one attitude at a time.
     type, extends(body_scene) :: plain_top
         type(heavy_top) :: top
     contains
@@ -83,50 +83,50 @@ contains
     end function all_solvers
 
     !> Whether a solver's drift is in this build.
-    function is_there(one) result(there)
-        type(solver), intent(in) :: one
+    function is_there(which) result(there)
+        type(solver), intent(in) :: which
         logical :: there
 
-        there = one%drift == ''
-        if (.not. there) there = known(one%drift)
+        there = which%drift == ''
+        if (.not. there) there = known(which%drift)
     end function is_there
 
     !> The solver's name in a legend.
-    function name_of(one) result(name)
-        type(solver), intent(in) :: one
+    function name_of(which) result(name)
+        type(solver), intent(in) :: which
         character(:), allocatable :: name
 
-        name = trim(one%with)
-        if (one%drift == 'flow') then
+        name = trim(which%with)
+        if (which%drift == 'flow') then
             name = name//', free flow'
-        else if (one%drift /= '') then
-            name = name//', '//escaped(one%drift)
+        else if (which%drift /= '') then
+            name = name//', '//escaped(which%drift)
         end if
     end function name_of
 
     !> The k-th setting of nine: a tolerance, or a step.
-    pure function setting_of(one, top, k) result(setting)
-        type(solver), intent(in) :: one
+    pure function setting_of(which, top, k) result(setting)
+        type(solver), intent(in) :: which
         type(top_at_start), intent(in) :: top
         integer, intent(in) :: k
         real(wp) :: setting
         type(splitting_scheme) :: scheme
 
-        select case (one%with)
+        select case (which%with)
         case ('extrapolate', 'scalar torque', 'dop853')
             setting = 10.0_wp**(-2 - 1.5_wp*(k - 1))
         case ('midpoint, lanes')
             setting = 4*top%step*0.72_wp**k
         case default
-            scheme = splitting_scheme(trim(one%with))
+            scheme = splitting_scheme(trim(which%with))
             setting = 0.4_wp*top%step*scheme%stages()*0.58_wp**k
         end select
     end function setting_of
 
-    !> Integrates a top `rounds` times over, each from its start; torques counted for one of them, the change
-    !> of a torque as one more.
-    subroutine run_solver(one, top, duration, setting, rounds, m, q, seconds, torques)
-        type(solver), intent(in) :: one
+    !> Integrates a top `rounds` times, each time from its start. `torques` counts the torques of one round;
+    !> the change of a torque counts as one torque more.
+    subroutine run_solver(which, top, duration, setting, rounds, m, q, seconds, torques)
+        type(solver), intent(in) :: which
         type(top_at_start), intent(in) :: top
         real(wp), intent(in) :: duration, setting
         integer, intent(in) :: rounds
@@ -147,17 +147,17 @@ contains
         stat = status_ok
         torques = 0.0_wp
         steps = max(1, nint(duration/setting))
-        if (one%drift /= '') then
-            scheme = splitting_scheme(trim(one%with))
+        if (which%drift /= '') then
+            scheme = splitting_scheme(trim(which%with))
             torques = real(steps, wp)*(scheme%stages() + count(abs(scheme%modified_coefficients()) > 0.0_wp))
-            drift%with = find_method(trim(one%drift))
+            drift%with = find_method(trim(which%drift))
             drift%rival = new_dmv_body(top%moments)
         end if
         start = clock(.false.)
         do pass = 1, rounds
             m = top%m0
             q = top%q0
-            select case (one%with)
+            select case (which%with)
             case ('extrapolate')
                 call extrapolate(body, scene, duration, m, q, setting, stat=stat, report=report)
                 torques = real(report%torques, wp)
@@ -171,7 +171,7 @@ contains
                 call midpoint_lanes(constants, duration, steps, m, q)
                 torques = real(torques_of_midpoint, wp)*steps
             case default
-                if (one%drift == 'flow') then
+                if (which%drift == 'flow') then
                     call integrate(body, scheme, scene, duration/steps, steps, m, q, joined=.true., stat=stat)
                 else
                     call integrate(body, scheme, scene, duration/steps, steps, m, q, drift=drift, stat=stat)

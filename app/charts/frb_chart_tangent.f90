@@ -3,7 +3,8 @@
 !> beside `flow_tangent`, with their cost.
 module frb_chart_tangent
     use frb, only: wp, flow_tangent, free_flow, gauss_legendre, quat_conjugate, quat_product, rigid_body
-    use frb_chart_failure, only: panels, names, titles, distances, new_failure_case, failed
+    use frb_chart_failure, only: panels, names, distances, new_failure_case, failed, begin_panels, &
+        begin_panel, begin_legend
     use frb_chart_output, only: chart_file, width, settings, open_table, open_script, draw, progress, say, &
         either
     use frb_chart_truth, only: free_case
@@ -22,8 +23,8 @@ module frb_chart_tangent
     character(*), parameter :: legend(rivals) = [character(20) :: 'flow\\_tangent', keys(2:)]
     real(wp), parameter :: roundoff = epsilon(1.0_wp)/2, floor_of_scores = 1.0e-2_wp
     real(wp), parameter :: no_turn(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-    !> Central differences take this change of m, for the smallest error; dual numbers short steps, at most so
-    !> many.
+    !> Change of m in central differences, chosen for the smallest error; largest number of short steps of
+    !> dual numbers.
     real(wp), parameter :: difference = 6.0e-6_wp
     integer, parameter :: most_steps = 20000
 
@@ -266,27 +267,11 @@ contains
         integer :: p, i
 
         call open_script(options, 'tangent', 1000, 1080, file)
-        call file%put('set multiplot title "Largest error of '//either(options%quick, '1', '3')// &
-            ' random cases: J = dm''/dm (lines), W = dθ''/dm (dashed)"')
-        call file%put_lines([character(width) :: 'set logscale xy', 'set format y "10^{%T}"', &
-            'set yrange [5e-3:1e19]', 'set ytics 1,1e4', 'set ytics add ("NaN" 1e18)', 'unset key', &
-            'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0', 'set size 0.25,0.195'])
+        call begin_panels(file, 'Largest error of '//either(options%quick, '1', '3')// &
+                          ' random cases: J = dm''/dm (lines), W = dθ''/dm (dashed)')
         do p = 1, panels
-            if (p == panels) then
-                call file%put_lines([character(width) :: 'set xrange [3e-9:1e3]', &
-                    'set xtics ("10^{-8}" 1e-8, "10^{-4}" 1e-4, "1" 1, "10^2" 1e2)'])
-            else
-                call file%put_lines([character(width) :: 'set xrange [0.3:3e-18]', &
-                    'set xtics ("0" 1e-17, "10^{-15}" 1e-15, "10^{-10}" 1e-10, "10^{-5}" 1e-5, '// &
-                    '"10^{-1}" 1e-1)'])
-            end if
-            write (file%line, '(a,f6.4,a,f6.4)') 'set origin ', 0.075 + 0.315*mod(p - 1, 3), ',', &
-                0.74 - 0.26*((p - 1)/3)
-            call file%put()
-            call file%put(either(mod(p, 3) == 1, 'set ylabel "error  [units]" offset 1.2,0', 'unset ylabel'))
-            call file%put('set title "'//trim(titles(p))//'" offset 0,-0.7')
-            call file%put_lines([character(width) :: 'plot \', &
-                '  4 with filledcurves y1=1e-3 lc rgb "#eeeeee" notitle, \'])
+            call begin_panel(file, p, [character(80) :: 'set xrange [3e-9:1e3]', &
+                'set xtics ("10^{-8}" 1e-8, "10^{-4}" 1e-4, "1" 1, "10^2" 1e2)'])
             do i = rivals, 1, -1
                 write (file%line, '(a,i0,a)') '  "tangent.dat" index ', (p - 1)*rivals + i - 1, &
                     ' using 1:2 with linespoints lw 2 pt 7 ps 0.4 lc rgb '//trim(colours(i))//', \'
@@ -297,11 +282,7 @@ contains
             end do
             call file%put('  NaN notitle')
         end do
-        call file%put_lines([character(width) :: &
-            'set origin 0.03,0.005', 'set size 0.94,0.16', 'unset border', 'unset tics', 'unset ylabel', &
-            'unset title', 'unset grid', 'unset logscale', 'set xrange [0:1]', 'set yrange [0:1]', &
-            'set key center center maxrows 2 samplen 2.2 spacing 1.3 Left reverse', &
-            'plot NaN with boxes fs solid noborder lc rgb "#eeeeee" title "up to 4 units", \'])
+        call begin_legend(file, 'maxrows 2 samplen 2.2 spacing 1.3')
         do i = 1, rivals
             write (label, '(a,f4.1,a)') ' (', cost(i + 1)/cost(1), ' times the step)'
             call file%put('  NaN with linespoints lw 2 pt 7 lc rgb '//trim(colours(i))//' title "'// &

@@ -20,8 +20,8 @@ module frb_chart_timing
         integer :: bodies = 1
         integer :: nsteps = 1               !! steps per round
         integer :: threads = 1              !! of the batch form; more than one needs -fopenmp
-        logical :: by_the_wall = .false.    !! measured on the wall, as several threads must be
-        integer :: rounds = 1               !! times the nsteps are taken, each from the start
+        logical :: by_the_wall = .false.    !! measured by the wall clock, as needed for several threads
+        integer :: rounds = 1               !! how often the nsteps are taken, each time from the start
         type(constants) :: ready            !! of the body, formed once
         real(wp), allocatable :: m0(:, :)   !! (3, bodies)
         real(wp), allocatable :: m(:, :)
@@ -53,10 +53,9 @@ contains
         end do
     end function new_workload
 
-    !> Nanoseconds per body and step, ns(work, repetition). A repetition is cut into slices of `seconds`, as
-    !> many rounds as that takes, and the slices of all works and repetitions take turns. Each repetition so
-    !> lasts as long as the run: a neighbour on the processor who comes and goes, for a tenth of a second or
-    !> half a minute, slows all of them alike and no point by itself.
+    !> Nanoseconds per body and step, ns(work, repetition). A repetition is cut into slices of `seconds`, and
+    !> the slices of all works and repetitions take turns. So each repetition is spread over the whole run:
+    !> another program on the processor, for a tenth of a second or half a minute, slows all points alike.
     subroutine time_in_turn(options, what, works, seconds, slices, ns)
         type(settings), intent(in) :: options
         character(*), intent(in) :: what
@@ -82,7 +81,7 @@ contains
         end do
     end subroutine time_in_turn
 
-    !> The same for steps of several sizes h, ns(work, h, repetition); a slice is one chain of steps.
+    !> As `time_in_turn`, for several sizes h of the step, ns(work, h, repetition); a slice is one chain.
     subroutine time_over_steps(options, what, works, h, seconds, slices, ns)
         type(settings), intent(in) :: options
         character(*), intent(in) :: what
@@ -140,7 +139,7 @@ contains
         end do
     end subroutine lengthen
 
-    !> Time of one slice, per body and step; every turn finds the stack elsewhere.
+    !> Time of one slice, per body and step; every turn has the stack at another place.
     function nanoseconds(work, turn) result(ns)
         type(workload), intent(inout) :: work
         integer, intent(in) :: turn
@@ -150,13 +149,13 @@ contains
         ns = 1.0e9_wp*run_below(work, mod(turn, places))/(real(work%nsteps, wp)*work%rounds*work%bodies)
     end function nanoseconds
 
-    !> `run` with the stack so many pages further down. Where the working storage of a batch lies changes its
-    !> time by up to 15 %, and a process would keep to one place; over many places it averages out.
+    !> `run` with the stack `pages` pages further down. The place of the working storage of a batch changes
+    !> its time by up to 15 %, and one process would keep one place: an average over many places is fair.
     recursive function run_below(work, pages) result(seconds)
         type(workload), intent(inout) :: work
         integer, intent(in) :: pages
         real(wp) :: seconds
-        real(wp), volatile :: page(512)     ! volatile, and set after the call: else it takes no room
+        real(wp), volatile :: page(512)     ! volatile and set after the call: else the compiler removes it
 
         if (pages > 0) then
             seconds = run_below(work, pages - 1)
@@ -166,7 +165,7 @@ contains
         page(1) = seconds
     end function run_below
 
-    !> Seconds all rounds take.
+    !> Time of all rounds [s].
     function run(work) result(seconds)
         type(workload), intent(inout) :: work
         real(wp) :: seconds
@@ -196,7 +195,7 @@ contains
         seconds = finish - start
     end function run
 
-    !> Seconds of processor time, which other programs on the machine do not lengthen, or seconds on the wall.
+    !> Processor time [s], which other programs on the machine do not lengthen, or time of the wall clock.
     function clock(by_the_wall) result(seconds)
         logical, intent(in) :: by_the_wall
         real(wp) :: seconds
@@ -219,7 +218,7 @@ contains
         !$ count = omp_get_num_procs()
     end function threads_there
 
-    !> Every body takes nsteps steps; the bodies are independent, so nothing waits for the step before.
+    !> Every body takes nsteps steps. In each step all bodies move: no step waits for the one before.
     subroutine advance_many(work)
         !$ use omp_lib, only: omp_set_num_threads
         type(workload), intent(inout) :: work

@@ -1,5 +1,5 @@
-!> The tables `torque-cost` and `torque-reversal`: what the splitting loop costs over the drifts and kicks it
-!> is made of, what the paper's long run keeps, and how well runs there and back return.
+!> The tables `torque-cost` and `torque-reversal`: cost of the splitting loop against that of its drifts and
+!> kicks, conserved quantities of the paper's long run, and how well runs there and back return.
 module frb_chart_torque
     use frb, only: wp, rigid_body, body_drift, body_observer, drift_by_name, free_flow, heavy_top, &
         integrate, scheme_names, splitting_plan, splitting_scheme, status_ok, total_energy

@@ -1,4 +1,4 @@
-!> Errors against the quadruple-precision truth, plain and in units of what rounding the inputs costs anyone.
+!> Errors against the truth in quadruple precision, absolute and in units of the inherent sensitivity.
 module frb_chart_truth
     use frb, only: wp
     use frb_chart_methods, only: method, advance, family_matrix, family_paper_a
@@ -9,7 +9,7 @@ module frb_chart_truth
 
     public :: free_case, new_case, add_sensitivity, errors_of, distance_m, distance_q
 
-    !> A body, its start at the identity attitude, and where it is at time t.
+    !> A body, its start at the identity attitude, and its exact state at time t.
     type :: free_case
         real(wp) :: moments(3) = 1.0_wp
         real(wp) :: m0(3) = 0.0_wp

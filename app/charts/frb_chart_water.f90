@@ -1,5 +1,5 @@
-!> The chart `water`: how well splitting schemes keep the energy of 64 rigid water molecules against what they
-!> cost, with the exact rotation for the drift and with the turns of NO_SQUISH.
+!> The chart `water`: error of the energy of 64 rigid water molecules against the cost of splitting schemes,
+!> with the exact rotation for the drift and with the turns of NO_SQUISH.
 module frb_chart_water
     use frb, only: wp, splitting_plan, splitting_scheme
     use frb_chart_output, only: chart_file, settings, open_table, open_script, draw, either, progress, say
@@ -20,7 +20,7 @@ contains
     !> 20 ps of every scheme and step; a block of the table for each scheme and drift.
     subroutine chart_water(options)
         type(settings), intent(in) :: options
-        real(wp), parameter :: spacing = 24.0_wp        ! of looks at the energy [fs]
+        real(wp), parameter :: spacing = 24.0_wp        ! time between samples of the energy [fs]
         character(*), parameter :: molecules = 'data/water64_start.txt'
         type(splitting_scheme) :: scheme
         type(cluster) :: start

@@ -119,7 +119,7 @@ contains
 
     subroutine list_charts()
         call say('usage: fpm run frb_charts --profile release -- [WHAT ...] [--quick] [--out DIR]')
-        call say('WHAT: all, which is all but the last, or any of')
+        call say('WHAT: all (all charts but the last), or any of')
         call say('  speed           table: the free flow against discrete Moser-Veselov, ratios of time')
         call say('  scenes          table: which method for which scene')
         call say('  cost            time per step against step size, all methods')
@@ -134,7 +134,7 @@ contains
         call say('  tangent         error of the derivative of a step against closeness to these places')
         call say('  water           energy of rigid water molecules: schemes, exact rotation and NO_SQUISH')
         call say('  orbits          polhodes, the tennis racket, the torus of a heavy top')
-        call say('  agreement       check: measures cost twice, tells how many ratios agree within 15 %')
+        call say('  agreement       check: measures cost twice, counts the ratios that agree within 15 %')
         call say('--quick: a minute for all of them; --out DIR: where the tables, scripts and '// &
             'pictures go (charts)')
     end subroutine list_charts

@@ -6,7 +6,7 @@ module frb_dmv
 
     public :: dmv_body, new_dmv_body, dmv_steps
 
-    ! fpm does not watch included text: after a change of it, build afresh.
+    ! fpm does not see changes of included files: remove build/ after one.
     include 'rivals/dmv.inc'
 
 end module frb_dmv

@@ -1,4 +1,4 @@
-!> The step of the free flow differentiated by machine, in dual numbers: the rival of flow_tangent.
+!> The step of the free flow with automatic derivatives, in dual numbers: the rival of flow_tangent.
 module frb_dual_steps
     use frb, only: wp
     implicit none

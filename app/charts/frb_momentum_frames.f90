@@ -11,7 +11,7 @@ module frb_momentum_frames
 
 contains
 
-    ! fpm does not watch included text: after a change of it, build afresh.
+    ! fpm does not see changes of included files: remove build/ after one.
     include 'rivals/frames.inc'
 
 end module frb_momentum_frames

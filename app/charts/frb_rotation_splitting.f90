@@ -6,7 +6,7 @@ module frb_rotation_splitting
 
     public :: rotation_steps
 
-    ! fpm does not watch included text: after a change of it, build afresh.
+    ! fpm does not see changes of included files: remove build/ after one.
     include 'rivals/rotations.inc'
 
 end module frb_rotation_splitting

@@ -6,7 +6,7 @@ module frb_runge_kutta
 
     public :: rk4_steps, dormand_prince
 
-    ! fpm does not watch included text: after a change of it, build afresh.
+    ! fpm does not see changes of included files: remove build/ after one.
     include 'rivals/runge_kutta.inc'
 
     include 'rivals/dormand_prince.inc'

@@ -7,7 +7,7 @@ module frb_taylor_truth
 
     public :: qp, taylor_flow, taylor_period, long_truth
 
-    ! fpm does not watch included text: after a change of it, build afresh.
+    ! fpm does not see changes of included files: remove build/ after one.
     include 'rivals/taylor.inc'
 
 end module frb_taylor_truth

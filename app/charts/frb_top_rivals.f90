@@ -7,12 +7,12 @@ module frb_top_rivals
 
     public :: dormand_prince_steps, midpoint_lanes, torques_of_midpoint
 
-    integer, parameter :: lanes = 8                 !! sequences of the midpoint rule, and one that rests
-    integer, parameter :: torques_of_midpoint = 77  !! of a step: 4 + 6 + ... + 16, and one for each sequence
+    integer, parameter :: lanes = 8                 !! sequences of the midpoint rule, and one idle lane
+    integer, parameter :: torques_of_midpoint = 77  !! in a step: 4 + 6 + ... + 16, and one for each sequence
 
 contains
 
-    ! fpm does not watch included text: after a change of it, build afresh.
+    ! fpm does not see changes of included files: remove build/ after one.
     include 'rivals/dormand_prince.inc'
 
     include 'rivals/midpoint_lanes.inc'

@@ -6,7 +6,7 @@ module frb_top_truth
 
     public :: qp, taylor_top
 
-    ! fpm does not watch included text: after a change of it, build afresh.
+    ! fpm does not see changes of included files: remove build/ after one.
     include 'rivals/taylor_top.inc'
 
 end module frb_top_truth

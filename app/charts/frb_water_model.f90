@@ -6,7 +6,7 @@ module frb_water_model
 
     public :: cluster, load, run_water
 
-    ! fpm does not watch included text: after a change of it, build afresh.
+    ! fpm does not see changes of included files: remove build/ after one.
     include '../../examples/water_model.inc'
 
 end module frb_water_model

@@ -71,7 +71,7 @@ contains
         call fail(message)
     end subroutine fail_run
 
-    !> Reads the command line; a missing init file or output has its default.
+    !> Reads the command line; where it does not name the init file or the output, they have their defaults.
     subroutine read_command(example, command)
         integer, intent(in) :: example              !! 0 to 4
         type(run_command), intent(out) :: command

@@ -1,5 +1,5 @@
-!> Explicit interfaces of the LAPACK routines that the library calls. Their kinds are named, so that flags for
-!> other default kinds do not change them.
+!> Explicit interfaces of the LAPACK routines that the library calls. All kinds are named: compiler flags that
+!> change the default kinds do not change the interfaces.
 module frb_lapack
     use frb_kinds, only: wp
     use, intrinsic :: iso_fortran_env, only: int32

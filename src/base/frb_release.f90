@@ -1,4 +1,4 @@
-!> The version of the package; a test holds it to the one in fpm.toml.
+!> The version of the package; a test compares it with the version in fpm.toml.
 module frb_release
     implicit none
     private

@@ -1,6 +1,6 @@
 !> Vectors, quaternions and rotation matrices: the algebra of section 1.4, all pure.
 !>
-!> Conventions of the whole library, stated once here. Quaternions are real(4), scalar first, with the
+!> Conventions of the whole library. Quaternions are real(4), scalar first, with the
 !> Hamilton product. An attitude, as a quaternion q or a matrix Q, takes body to space: v_space = Q v_body.
 !> Angular momentum m and angular velocity omega = m/I are in the body frame: q' = q (0, omega)/2,
 !> Q' = Q hat(omega), and Q m is constant.
@@ -64,8 +64,8 @@ contains
     end function quat_conjugate
 
     !> Whether q is a unit quaternion: finite, | |q| - 1 | at most 1e-6. Every routine of the library that
-    !> needs a unit quaternion asks this and refuses others, with `status_bad_attitude` or with NaN. Routines
-    !> that take any norm say so.
+    !> needs a unit quaternion calls this function and refuses other quaternions, with `status_bad_attitude`
+    !> or with NaN. Routines that take any norm say so.
     pure function is_unit_quat(q) result(good)
         real(wp), intent(in) :: q(4)
         logical :: good
@@ -116,7 +116,7 @@ contains
         real(wp) :: q(4)
         real(wp), parameter :: tolerance = 1.0e-6_wp, largest_element = 2.0_wp
 
-        ! Large elements first: their squares may overflow.
+        ! Large elements are refused before the product is formed: their squares may overflow.
         if (all(ieee_is_finite(matrix))) then
             if (all(abs(matrix) < largest_element)) then
                 q = quat_along(matrix)

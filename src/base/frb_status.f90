@@ -24,13 +24,13 @@ module frb_status
     integer, parameter :: status_bad_attitude = 4   !! attitude is not finite, or a quaternion of norm zero
     integer, parameter :: status_bad_time = 5       !! time or step is not finite, or zero where it may not be
     integer, parameter :: status_bad_count = 6      !! a number of bodies, points, steps or a size is wrong
-    integer, parameter :: status_bad_option = 7     !! an option has none of its values
+    integer, parameter :: status_bad_option = 7     !! an option has none of its permitted values
     integer, parameter :: status_bad_torque = 8     !! a torque or potential returned NaN or Inf
     integer, parameter :: status_bad_scheme = 9     !! coefficients do not sum to one, or are not symmetric
     integer, parameter :: status_no_period = 10     !! the motion has no period (a separatrix)
     integer, parameter :: status_lapack_failed = 11 !! an eigensolver of LAPACK did not converge
     integer, parameter :: status_stopped = 12       !! an observer ended the run
-    integer, parameter :: status_not_offered = 13   !! a scene does not tell this
+    integer, parameter :: status_not_offered = 13   !! a scene does not provide this quantity
     integer, parameter :: status_too_rough = 14     !! a torque is too rough for the tolerance
 
 contains
@@ -69,7 +69,7 @@ contains
         case (status_bad_attitude)
             message = 'the attitude must be finite, a quaternion of nonzero norm'
         case (status_bad_time)
-            message = 'the time or step must be finite, and not zero where a step is divided by'
+            message = 'the time or step must be finite, and a step that divides must not be zero'
         case (status_bad_count)
             message = 'a count or an array size is out of range or does not match the others'
         case (status_bad_option)
@@ -83,7 +83,7 @@ contains
         case (status_lapack_failed)
             message = 'the eigensolver of LAPACK did not converge'
         case (status_not_offered)
-            message = 'the scene does not tell this'
+            message = 'the scene does not provide this quantity'
         case (status_too_rough)
             message = 'the torque is too rough for the tolerance'
         case (status_stopped)

@@ -23,12 +23,13 @@ module frb_inertia
                                                      0.0_wp, 0.0_wp, 1.0_wp], [3, 3])
     real(wp), parameter :: no_turn(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
 
-    !> What `type(rigid_body)` holds. A core that could not be made has `status /= status_ok`, and every
-    !> routine that takes a body refuses it with that code. Interoperable, so that C can hold arrays of them.
+    !> The contents of `type(rigid_body)`. A core that could not be made has `status /= status_ok`, and every
+    !> routine that takes a body refuses it with that code. Interoperable, so that C can hold arrays of cores.
     type, bind(c) :: body_core
         ! The components that blocks of bodies read come first, in one line of the cache.
-        real(c_double) :: lane = 0.0_wp               !! 1 to 3: first axis of the cyclic order; 4: the axes
-                                                      !! turn; < 0: moments descend; 0: not in a block
+        real(c_double) :: lane = 0.0_wp               !! 1 to 3: first axis of the cyclic order; 4: the body
+                                                      !! needs a rotation; < 0: moments descend; 0: the body
+                                                      !! cannot be in a block
         real(c_double) :: a(3) = 0.0_wp               !! 1/I, sorted: a(1) >= a(2) >= a(3)
         real(c_double) :: alpha = 0.0_wp              !! a(2) - a(3) >= 0, from the differences
         real(c_double) :: beta = 0.0_wp               !! a(1) - a(3) >= 0
@@ -41,7 +42,7 @@ module frb_inertia
         logical(c_bool) :: needs_rotation = .false.   !! body axes are not principal, or the rotor is linear
         real(c_double) :: axes(3, 3) = identity       !! columns: principal axes in body axes
         real(c_double) :: axes_q(4) = no_turn         !! the same rotation as a quaternion, principal to body
-        real(c_double) :: axis(3) = 0.0_wp            !! of the zero moment of a linear rotor, in body axes
+        real(c_double) :: axis(3) = 0.0_wp            !! axis of a linear rotor's zero moment, in body axes
     end type body_core
 
     !> Moments that differ by less than this part of the largest moment are equal, and smaller moments are 0:
@@ -63,7 +64,7 @@ contains
         real(wp) :: sorted(3)
         integer :: order(3)
 
-        ! Finite first: comparing a NaN would raise a floating-point exception.
+        ! Test for finite numbers first: comparing a NaN would raise a floating-point exception.
         if (.not. all(ieee_is_finite(moments))) return
         if (any(moments < 0.0_wp)) return
         call sorting_order(moments, order, core%parity)

@@ -26,8 +26,8 @@ contains
     !> equal moments and without momentum have formulas of their own.
     !>
     !> np absent or 0: exact. np >= 1: semi-exact, the integral of the third kind by np Gauss-Legendre points
-    !> (order 2 np in h, time-symmetric; |m|, the energy and Q m are kept all the same); for a small h only,
-    !> and not faster than the exact step.
+    !> (order 2 np in h, time-symmetric; |m|, the energy and Q m are kept too); for a small h only, and not
+    !> faster than the exact step.
     !>
     !> Accuracy of the exact step, in units of the inherent sensitivity (data/reference): median below 1 and
     !> maximum below 3 in every group, for m and Q; Q orthogonal to 1e-14 (checked by steps). In a chain of
@@ -89,7 +89,7 @@ contains
         else
             v(motion%order) = motion%parity*turn(2:4)
         end if
-        ! The factor comes last: factor*q0 may be next to 1/2, and its rounding errors would have one sign.
+        ! Multiply by the factor last: factor*q0 may be next to 1/2, where rounding errors have one sign.
         factor = 2/(q0*q0 + v(1)*v(1) + v(2)*v(2) + v(3)*v(3))
         associate (a1 => q_in(:, 1), a2 => q_in(:, 2), a3 => q_in(:, 3))
             q_out(:, 1) = a1 + factor*(a2*(v(1)*v(2) + q0*v(3)) + a3*(v(1)*v(3) - q0*v(2)) &
@@ -102,8 +102,8 @@ contains
     end function turned_attitude
 
     !> The change of the momentum and the turn of the body. Lines (5) to (18) of Algorithm 1: the rotation
-    !> P(0)^T Y(psi) P(h), P = [v, w, m]^T with v along m', (6), in sorted axes. It comes back as a
-    !> quaternion: the nine numbers are a rotation up to rounding only, and every quaternion is one.
+    !> P(0)^T Y(psi) P(h), P = [v, w, m]^T with v along m', (6), in sorted axes. The result is a quaternion:
+    !> nine rounded numbers are nearly a rotation, a quaternion always is one.
     subroutine change_and_turn(motion, points, change, turn, code)
         type(paper_motion), intent(in) :: motion
         integer, intent(in) :: points

@@ -77,7 +77,7 @@ contains
         integer, intent(out) :: code                !! `status_ok`, or what is wrong
         real(wp) :: j1, j2, j3, largest, scaled(3), excess
 
-        ! Finite first: comparing a NaN would raise a floating-point exception.
+        ! Test for finite numbers first: comparing a NaN would raise a floating-point exception.
         code = status_bad_moments
         if (.not. all(ieee_is_finite(moments))) return
         if (min(moments(1), moments(2), moments(3)) < tiny(1.0_wp)) return

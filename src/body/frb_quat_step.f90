@@ -14,7 +14,7 @@ module frb_quat_step
 
     public :: quat_step
 
-    integer, parameter :: frame_shortest = 1    !! p takes m to e3 on the shortest way
+    integer, parameter :: frame_shortest = 1    !! p takes m to e3 by the shortest rotation
     integer, parameter :: frame_derivative = 2  !! first row of P along m', as in Algorithm 1
     integer, parameter :: frame_axis = 3        !! first row of P along m x e3
 
@@ -30,8 +30,8 @@ contains
     !>
     !> np absent or 0: exact, and qout depends continuously on h. np >= 1: semi-exact, the integral of the
     !> third kind by np Gauss-Legendre points (order 2 np in h, time-symmetric; |m|, the energy and the
-    !> momentum in space are kept all the same); for a small h only, and not faster than the exact step. The
-    !> turn from qin to qout then has a scalar part >= 0.
+    !> momentum in space are kept too); for a small h only, and not faster than the exact step. The turn
+    !> from qin to qout then has a scalar part >= 0.
     !>
     !> Accuracy of the exact step, in units of the inherent sensitivity (data/reference): in every group a
     !> median below 1.5 and a maximum below 3, for q in each frame, and below 1 and 3 for m; the turn from qin
@@ -205,8 +205,8 @@ contains
         y(2) = product(4)*cosine + product(1)*sine
     end subroutine exact_turn
 
-    !> (cos(psi/2), sin(psi/2)) by quadrature. In frame (1) psi of (16) has a term f more: the change of the
-    !> angle of the vector (m2, m1).
+    !> (cos(psi/2), sin(psi/2)) by quadrature. In frame (1) psi of (16) has one more term, f: the change of
+    !> the angle of the vector (m2, m1).
     subroutine quadrature_turn(motion, step, points, frame, y, code)
         type(paper_motion), intent(in) :: motion
         type(momentum_step), intent(in) :: step

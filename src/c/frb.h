@@ -3,11 +3,12 @@
  * m is angular momentum in body axes, 3 doubles; q is attitude, a quaternion with its scalar first that takes body
  * axes to space, 4 doubles. Any consistent units. Angles are in rad.
  *
- * A body and a motion are plain values: copy them, put them into structs, free nothing. What C never set is refused.
+ * A body and a motion are plain values: copy them, put them into structs, free nothing. One that was never set is
+ * refused.
  *
- * Every function but the last four returns a status, FRB_OK or why the input was refused; then the state is as it
- * was. A null pointer is refused as what it stands for would be (q may be NULL: no attitude). Nothing prints or
- * stops. All functions may be called from several threads at once.
+ * Every function but the last four returns a status, FRB_OK or why the input was refused; a refused state stays as it
+ * was. A null pointer has the status of the argument that it stands for (q may be NULL: no attitude). Nothing prints
+ * or stops. All functions may be called from several threads at once.
  *
  * ldb, ldm, ldq are strides in doubles, from one body, momentum or quaternion to the next, as in LAPACK: for an
  * array of structs the size of the struct over that of a double. Packed arrays (ldb FRB_BODY_DOUBLES or 0, ldm 3,
@@ -81,10 +82,10 @@ int frb_motion_period(const frb_motion *motion, double *period, double *precessi
  * what the caller of frb_integrate gave. */
 typedef int (*frb_torque)(void *context, const double q[4], double t, double tau[3]);
 
-/* Runs a body under a torque: so many steps of size h, in place, by a splitting scheme of the library ("strang",
- * "srkn14", ...). t (or NULL) goes on by steps*h. rests (or NULL) makes a compensated run, which costs twice the time
- * and keeps the energy to the last digits: 7 doubles, 0 at the start, which a run that is continued needs again. A run
- * that is continued ends with the same bits as one in a piece. q must be of norm one, to 1e-6. */
+/* Runs a body under a torque, in place: `steps` steps of size h by a splitting scheme of the library ("strang",
+ * "srkn14", ...). t (or NULL) grows by steps*h. rests (or NULL) makes a compensated run, which costs twice the time
+ * and keeps the energy to the last digits: 7 doubles, 0 at the start; to continue a run, pass them on unchanged. A run
+ * in two calls ends with the same bits as a run in one call. q must be of norm one, to 1e-6. */
 int frb_integrate(const frb_body *body, const char *scheme, frb_torque torque, void *context, double h, int64_t steps,
                   double m[3], double q[4], double *t, double rests[7]);
 
@@ -92,12 +93,13 @@ int frb_integrate(const frb_body *body, const char *scheme, frb_torque torque, v
 int frb_integrate_top(const frb_body *body, const char *scheme, const double force[3], const double centre[3], double h,
                       int64_t steps, double m[3], double q[4], double *t, double rests[7]);
 
-/* Text of a status, and the version of the library: as much as fits into text[size], with its ending null; the length
- * of the whole comes back. */
+/* Text of a status, and the version of the library: as much as fits into text[size], with its ending null. Both
+ * functions return the length of the whole text. */
 size_t frb_status_message(int status, char *text, size_t size);
 size_t frb_version(char *text, size_t size);
 
-/* Sizes the library was built with: sizeof(frb_body) and sizeof(frb_motion), or this is the header of another. */
+/* Sizes the library was built with: other than sizeof(frb_body) and sizeof(frb_motion), if this is the header of
+ * another version. */
 size_t frb_body_bytes(void);
 size_t frb_motion_bytes(void);
 

@@ -1,6 +1,6 @@
 !> The C interface, described in frb.h: bodies and motions are values of fixed size in the caller's memory,
-!> every refusal is a status, nothing stops or prints. No name here may be that of a module: a bind(C) name is
-!> global as those are, and gfortran takes one for the other without a word.
+!> every refusal is a status, nothing stops or prints. A bind(C) name must not be the name of a module: both
+!> are global names, and gfortran mixes them up without a message.
 module frb_c
     use frb_c_memory, only: triple, quadruple, matrix, find_state, store_body, usable, all_usable, copied
     use frb_flow_bodies, only: flow_many
@@ -21,7 +21,7 @@ module frb_c
     !> Bodies gathered at a time where memory has other strides than the library.
     integer, parameter :: chunk = 64
 
-    !> A motion that was made here bears the seal: memory that C never set does not.
+    !> Stands in every motion that `frb_motion_start` made: memory that C never set does not hold it.
     integer(c_int), parameter :: seal_of_motions = 1713044275_c_int
     !> The motion and its seal.
     type :: sealed_motion
@@ -142,8 +142,7 @@ contains
         stat = int(code, c_int)
     end function c_flow_many
 
-    !> The same where bodies or states stand further apart, or bodies were not made: chunk after chunk is
-    !> gathered.
+    !> The flow of n bodies that are not packed, or were not made: bodies and states are copied in chunks.
     subroutine flow_strided(words, h, m, code, q)
         real(c_double), intent(in), target :: words(:, :)   !! bodies: one, or as many as states
         real(c_double), intent(in) :: h
@@ -291,7 +290,7 @@ contains
         bytes = one*8*motion_doubles
     end function c_motion_bytes
 
-    !> Whether a size is at least what it must be and no more than the library counts to.
+    !> Whether a size is at least `least` and no more than the largest default integer.
     pure function in_range(number, least) result(yes)
         integer(c_size_t), intent(in) :: number
         integer, intent(in) :: least

@@ -1,4 +1,4 @@
-!> What the C interface finds behind the caller's pointers: numbers, bodies, texts.
+!> Access of the C interface to the caller's memory: numbers, bodies, texts.
 module frb_c_memory
     use frb_free_flow, only: rigid_body
     use frb_inertia, only: body_core
@@ -10,7 +10,7 @@ module frb_c_memory
 
     public :: triple, quadruple, matrix, find_state, store_body, usable, all_usable, copied
 
-    !> What pointers of C point to: three numbers.
+    !> Three numbers.
     type, bind(c) :: triple
         real(c_double) :: x(3)
     end type triple
@@ -65,7 +65,7 @@ contains
         stat = made%status
     end subroutine store_body
 
-    !> Whether memory holds a body, made or refused: what C never set has no order of the axes.
+    !> Whether memory holds a body, made or refused: memory that C never set holds no order of the axes.
     pure function usable(core) result(yes)
         type(body_core), intent(in) :: core
         logical :: yes
@@ -75,7 +75,7 @@ contains
         if (yes .and. core%status == status_ok) yes = core%a(3) > 0.0_c_double
     end function usable
 
-    !> Whether all of them are usable.
+    !> Whether all cores are usable.
     pure function all_usable(core) result(yes)
         type(body_core), intent(in) :: core(:)
         logical :: yes
@@ -87,7 +87,7 @@ contains
         end do
     end function all_usable
 
-    !> Whether a number can be that of an axis.
+    !> Whether a number is that of an axis, 1 to 3.
     pure function is_axis(i) result(yes)
         integer(c_int), intent(in) :: i
         logical :: yes

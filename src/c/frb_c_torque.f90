@@ -15,7 +15,7 @@ module frb_c_torque
 
     public :: torque_in_c
 
-    !> What a torque in C takes.
+    !> The arguments of a torque in C.
     abstract interface
         !> The user's torque in C.
         function torque_in_c(context, q, t, tau) bind(c) result(stat)
@@ -90,7 +90,7 @@ contains
         call run(body, scheme, scene, h, steps, m, q, t, rests, stat)
     end function c_integrate_top
 
-    !> Both, once pointers are sorted out.
+    !> The run of a scene; checks the pointers that both kinds of runs share.
     subroutine run(body, scheme, scene, h, steps, m, q, t, rests, stat)
         type(c_ptr), intent(in) :: body, scheme, m, q, t, rests
         class(body_scene), intent(inout) :: scene

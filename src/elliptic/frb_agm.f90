@@ -34,13 +34,13 @@ module frb_agm
     !> Where the gap is below this radius, a short series takes the place of all further steps.
     real(wp), parameter :: series_radius = 1.0e-4_wp
 
-    !> The same for the mean alone, which is even in the gap: the first term left out is 11 c**6/256.
+    !> The radius for the mean alone, an even function of the gap: the first term left out is 11 c**6/256.
     real(wp), parameter :: mean_radius = 3.0e-3_wp
 
     !> An angle u below this bound equals its sine, its F and its amplitude to rounding, u**3/6 < eps u/4.
     real(wp), parameter :: small_angle = 1.0e-8_wp
 
-    !> Where y(n)/y(n+1) is beyond this ratio, rounding makes the angle 0 or pi.
+    !> Where y(n)/y(n+1) is above this ratio, rounding makes the angle 0 or pi.
     real(wp), parameter :: far = 1.0e20_wp
 
     !> pi as a sum of two parts. The first has 30 bits: its product with a count below 2**23 is exact.
@@ -170,7 +170,7 @@ contains
     !> sn0**2 + cn0**2 may differ from one: only the angle of (cn0, sn0) is used, and (0, 0) has the angle 0.
     !> At k = 1 the motion tends to sn = +-1: cn keeps the sign of cn0, and from cn0 = 0 nothing moves.
     !> Domain: |k| <= 1 (or 0 <= kc2 <= 1), all arguments finite, |sn0|, |cn0| <= 1e100; outside: NaN.
-    !> Accuracy: as of `jacobi` at u0 + du; checked by agm: momentum-step-agrees-with-jacobi.
+    !> Accuracy: that of `jacobi` at u0 + du; checked by agm: momentum-step-agrees-with-jacobi.
     pure subroutine landen_step(sn0, cn0, du, k, sn, cn, dn, phi0, phi1, kc2)
         real(wp), intent(in) :: sn0, cn0           !! sn and cn at the start
         real(wp), intent(in) :: du                 !! change of the argument, lambda h

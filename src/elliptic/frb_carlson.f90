@@ -20,10 +20,10 @@ module frb_carlson
 
     public :: rf, rc, rj, rd, rf_and_rj
 
-    !> For arguments between these bounds no product on the way overflows, or loses digits by underflow.
+    !> For arguments between these bounds no intermediate product overflows, or loses digits by underflow.
     real(wp), parameter :: smallest_moderate = 1.0e-60_wp, largest_moderate = 1.0e60_wp
 
-    !> A p above x, y, z by the full range of numbers comes closer to them by a factor of four in each step.
+    !> Each step divides the ratio of p to x, y, z by about four; it can be as large as the range of numbers.
     integer, parameter :: most_extreme_steps = 1100
 
 contains

@@ -1,5 +1,5 @@
-!> 1 - k**2 and 1 - n, from k and n or as the caller gives them, and whether they are in the domain: said once
-!> for every elliptic integral and function. Close to k = 1 and n = 1 all digits are in these differences.
+!> 1 - k**2 and 1 - n for all elliptic integrals and functions: formed from k and n, or given by the caller,
+!> and checked. Close to k = 1 and n = 1 the result depends on these differences, not on k and n.
 module frb_complements
     use frb_kinds, only: wp
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
@@ -10,13 +10,13 @@ module frb_complements
 
 contains
 
-    !> 1 - k**2 of a modulus |k| <= 1, or kc2, 0 <= kc2 <= 1; -1 for what is outside or not finite.
+    !> 1 - k**2 of a modulus |k| <= 1, or kc2, 0 <= kc2 <= 1; -1 for a number that is outside or not finite.
     pure function modulus_complement(k, kc2) result(complement)
         real(wp), intent(in) :: k                  !! modulus
         real(wp), intent(in), optional :: kc2      !! 1 - k**2; k is then not used
         real(wp) :: complement
 
-        ! Finite first: comparing a NaN would raise a floating-point exception.
+        ! Test for finite numbers first: comparing a NaN would raise a floating-point exception.
         complement = -1.0_wp
         if (present(kc2)) then
             if (.not. ieee_is_finite(kc2)) return

@@ -1,9 +1,10 @@
-!> Carlson's duplications and the series that end them, for arguments of moderate size: what RF, RC and RJ
-!> of `frb_carlson` are made of.
+!> Carlson's duplications and the series that end them, for arguments of moderate size: the parts of RF, RC
+!> and RJ of `frb_carlson`.
 !>
-!> One duplication replaces each argument v by (v + lambda)/4, lambda = sqrt(x y) + sqrt(x z) + sqrt(y z), and
-!> draws the arguments together four times closer. Then a Taylor series about their mean ends the work. It is
-!> longer than usual (degree 11 for RF, 9 for RJ), because one more duplication costs more than a dozen terms.
+!> One duplication replaces each argument v by (v + lambda)/4, lambda = sqrt(x y) + sqrt(x z) + sqrt(y z): the
+!> differences of the arguments become four times smaller. When they are small, a Taylor series about the mean
+!> gives the integral. It is longer than usual (degree 11 for RF, 9 for RJ), because one more duplication
+!> costs more than a dozen terms.
 !>
 !> Source: B. C. Carlson, Numerical computation of real or complex elliptic integrals, Numer. Algorithms 10
 !> (1995) 13-26; DLMF 19.19.7 (the series) and 19.36.
@@ -137,7 +138,7 @@ contains
         end if
     end function rc_series
 
-    !> Duplications until x, y, z, p are within `rj_radius` of their mean. Of the changed arguments
+    !> Duplications until x, y, z, p are within `rj_radius` of their mean. With the new arguments
     !> RJ(old) = total + quarter RJ(x, y, z, p) and RF(old) = RF(x, y, z), where quarter = 4**-steps and
     !> total = sum of 6 4**-n/d_n RC(1, 1 + e_n), e_n = delta/(64**n d_n**2), (Carlson 1995, section 2.3).
     pure subroutine rj_duplications(x, y, z, p, total, quarter)

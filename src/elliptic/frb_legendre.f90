@@ -53,7 +53,7 @@ contains
 
     !> Pi(phi2, n, k) - Pi(phi1, n, k), the integral from phi1 to phi2, any amplitudes.
     !> Each half turn adds two complete integrals; the remaining angles add two incomplete ones.
-    !> Domain: phi1, phi2 finite, |k| <= 1, n < 1 (or n sin**2 < 1 on the whole way); outside: NaN.
+    !> Domain: phi1, phi2 finite, |k| <= 1, n < 1 (or n sin**2 < 1 from phi1 to phi2); outside: NaN.
     !> An integral across pi/2 + j pi at k = 1 or nc = 0 is Infinity with the sign of phi2 - phi1, and so is a
     !> value beyond the largest number.
     !> Accuracy: 8 epsilon (|Pi(phi1)| + |Pi(phi2)|), and the change that half an ulp of the amplitudes makes;

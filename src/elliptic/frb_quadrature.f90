@@ -156,7 +156,7 @@ contains
         end if
     end function integrand
 
-    !> The rule into arrays of at least np elements.
+    !> Writes the rule into arrays of at least np elements.
     pure subroutine fill_rule(np, nodes, weights, code)
         integer, intent(in) :: np
         real(wp), intent(out) :: nodes(:), weights(:)

@@ -8,8 +8,8 @@
 !> | 3 | h, Tfin, m(3), Q(9), I(3), np |
 !> | 4 | h, Tfin, m(3), q(4), I(3), np |
 !>
-!> Matrices stand column by column, quaternions scalar first; np = 0 means exact. `frb_number_files` has the
-!> form of the numbers. A file is rejected at its first invalid number.
+!> Matrices stand column by column, quaternions scalar first; np = 0 means exact. `frb_number_files` describes
+!> how numbers may be written. A file is rejected at its first invalid number.
 module frb_init_files
     use frb_kinds, only: wp, most_points
     use frb_number_files, only: number_file
@@ -122,7 +122,7 @@ contains
 
         steps = 0
         if (.not. (abs(h) > 0.0_wp .and. (t_final > 0.0_wp .eqv. h > 0.0_wp))) return
-        ! t_final is divided by the largest count: the quotient with h could overflow.
+        ! t_final is divided by the largest count: t_final/h could overflow.
         if (abs(t_final)/most_steps >= abs(h)) return
         quotient = t_final/h
         steps = int(quotient)
@@ -208,7 +208,7 @@ contains
         real(wp) :: defect(3, 3)
         integer :: i
 
-        ! Entries first: the product could overflow.
+        ! Large entries are refused before the product is formed: it could overflow.
         if (maxval(abs(matrix)) > 2.0_wp) then
             error = file%complaint('Q', 'an orthogonal matrix, column by column', &
                                    'an entry of magnitude '//text(maxval(abs(matrix))))

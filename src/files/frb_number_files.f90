@@ -1,11 +1,11 @@
 !> Files of numbers, read item by item as Fortran's list-directed input reads them. Every error message names
 !> the file, the line and the item.
 !>
-!> Values stand between blanks, tabs or line ends, with at most one comma between two of them; `3*0.5` stands
-!> for three. A number is an optional sign, digits with an optional point, and an optional exponent: E, D or
-!> Q, in either case, and a whole number; or a signed whole number alone (`1+5`). Words after the last number
-!> of an item are ignored to the end of the line. A list-directed read leaves a variable unset where two
-!> commas have nothing between them, for `3*` and for a slash: here these are errors.
+!> Values are separated by blanks, tabs or line ends, with at most one comma between two values; `3*0.5`
+!> stands for three values. A number is an optional sign, digits with an optional point, and an optional
+!> exponent: E, D or Q, in either case, and a whole number; or a signed whole number alone (`1+5`). Words
+!> after the last number of an item are ignored to the end of the line. A list-directed read leaves a variable
+!> unset where two commas have nothing between them, for `3*` and for a slash: here these are errors.
 !>
 !> Further, a comment runs from # or ! to the end of its line, several items may share a line, and a byte
 !> order mark of UTF-8 is skipped. If something is wrong, `error` comes back allocated, as one line of text.
@@ -82,7 +82,7 @@ contains
         integer :: io
 
         self%path = trim(path)
-        self%last = 'the begin'
+        self%last = 'the start'
         self%word = ''
         allocate (self%lines(64))
         allocate (character(longest_line + piece) :: self%buffer)
@@ -95,8 +95,8 @@ contains
         if (io /= 0) error = self%path//': cannot be opened for reading'
     end subroutine open_for_reading
 
-    !> Whether a path leads to the file that is open here, by any name or link; not so for a device, such as a
-    !> terminal, that is read and written. '-' is standard output.
+    !> Whether a path leads to the file that is open here, by any name or link; false for a device, such as a
+    !> terminal, which may be read and written. '-' is standard output.
     function is_file(self, path) result(same)
         class(number_file), intent(in) :: self
         character(*), intent(in) :: path
@@ -153,7 +153,7 @@ contains
     !> An item of as many numbers as `values` holds.
     subroutine read_numbers(self, item, values, error)
         class(number_file), intent(inout) :: self
-        character(*), intent(in) :: item                    !! their common name, for messages
+        character(*), intent(in) :: item                    !! common name of the numbers, for messages
         real(wp), intent(out) :: values(:)                  !! 0 from the first error on
         character(:), allocatable, intent(out) :: error
         character(24) :: number
@@ -276,7 +276,7 @@ contains
         value = self%value
     end subroutine next_number
 
-    !> Goes on to the next character that is not blank, on this line or on a later one.
+    !> Moves to the next character that is not blank, on this line or on a later one.
     subroutine find_word(self, found, error)
         class(number_file), intent(inout) :: self
         logical, intent(out) :: found                       !! false at the end of the file

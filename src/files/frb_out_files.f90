@@ -27,8 +27,8 @@ module frb_out_files
     type :: out_file
         character(:), allocatable :: path   !! as the caller gave it
         integer :: descriptor = 0           !! 1: it is standard output, 2: standard error
-        character(:), allocatable, private :: target_path   !! where its links lead to
-        character(:), allocatable, private :: temporary     !! '' if it is written directly
+        character(:), allocatable, private :: target_path   !! the file that its links lead to
+        character(:), allocatable, private :: temporary     !! name of the temporary file; '' if there is none
         type(c_ptr), private :: stream = c_null_ptr
         integer(int64), private :: length = 0   !! of all lines written, in bytes
         logical, private :: broken = .false.    !! something could not be written
@@ -62,7 +62,7 @@ contains
         case ('/dev/stderr', '/dev/fd/2', '/proc/self/fd/2')
             self%descriptor = 2
         case default
-            ! Opened to append, a file keeps what is in it.
+            ! A file that is opened to append keeps its contents.
             if (exists) self%stream = c_fopen(self%target_path//c_null_char, 'a'//c_null_char)
             if (exists .and. .not. c_associated(self%stream)) then
                 error = self%path//': cannot be made (is it a directory, or read-only?)'
@@ -212,8 +212,8 @@ contains
         name = ''
     end function followed
 
-    !> Whether nobody has the right to write to an existing file, asked for root only, who can write to such a
-    !> file all the same. The command `find` shows the rights; opening the file does not.
+    !> Whether nobody has the right to write to an existing file. Needed for root only, who can write to such
+    !> a file nevertheless: the command `find` shows the rights, opening the file does not.
     function is_marked_read_only(path) result(read_only)
         character(*), intent(in) :: path
         logical :: read_only

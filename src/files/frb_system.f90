@@ -1,5 +1,5 @@
 !> The routines of C and POSIX that the library calls, for streams that report a full disk, names of files and
-!> the process, and a few words on top of them.
+!> the process, and two procedures made of them.
 module frb_system
     use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_intptr_t, c_long, c_null_char, &
         c_ptr, c_size_t

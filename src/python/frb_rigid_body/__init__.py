@@ -60,7 +60,7 @@ class RigidBody(_frb.Bodies):
 
 
 class RigidBodies(_frb.Bodies):
-    """n rigid bodies: moments of shape (n, 3), or inertia tensors of shape (n, 3, 3); as RigidBody."""
+    """n rigid bodies: moments of shape (n, 3), or inertia tensors of shape (n, 3, 3), each as in RigidBody."""
 
     def __new__(cls, inertia: ArrayLike) -> RigidBodies:
         numbers = np.ascontiguousarray(inertia, dtype=np.float64)
@@ -121,12 +121,12 @@ Torque = Callable[[Array, float], Sequence[float]]
 
 def integrate(body: RigidBody, torque: Union[HeavyTop, Torque], h: float, steps: int, m: ArrayLike, q: ArrayLike, *,
               scheme: str = "srkn14", every: int = 0, t: float = 0.0, compensated: bool = False) -> Trajectory:
-    """Run a body under torque: ``steps`` steps of size ``h`` from the state m, q at time t, which are left alone.
+    """Run a body under torque: ``steps`` steps of size ``h`` from the state m, q at time t; m and q are not changed.
 
-    ``torque`` is a HeavyTop, or a function ``torque(q, t)`` that returns three numbers, in body axes: that is slow,
-    about a microsecond a call and ``steps`` times the stages of the scheme of them. Its exceptions come through.
-    ``every`` > 0 keeps the state after so many steps, the start and the end included; else only both of these.
-    ``compensated`` carries rounding errors over from step to step, at twice the time. q must be of norm one.
+    ``torque`` is a HeavyTop, or a function ``torque(q, t)`` that returns three numbers, in body axes. A function is
+    slow, about a microsecond a call, and is called once for each stage of each step. Its exceptions are passed on.
+    ``every`` > 0 returns the state at the start, after each ``every`` steps and at the end; 0: at the start and the
+    end. ``compensated`` carries rounding errors over from step to step, at twice the time. q must be of norm one.
     """
     state_m = np.array(m, dtype=np.float64)
     state_q = np.array(q, dtype=np.float64)

@@ -1,4 +1,4 @@
-!> Splitting runs of as many steps as the argument says, by every loop, plain and compensated.
+!> Splitting runs by every loop, plain and compensated; the argument is the number of steps.
 program main
     use frb, only: wp, body_drift, drift_by_name, heavy_top, integrate, rigid_body, splitting_scheme
     use frb_still_bodies, only: even_torques, onlooker

@@ -1,4 +1,4 @@
-!> A program with other default kinds: it calls all that goes to LAPACK, a step of the paper, the free flow.
+!> A program with other default kinds: calls all routines that use LAPACK, a step of the paper, the free flow.
 program main
     use frb, only: wp, eint_gauss, ellint_pi, free_flow, order_report, principal_axes, quat_step, &
         rigid_body, splitting_scheme, status_ok
