@@ -46,6 +46,7 @@ program check
     use frb_test_flow_accuracy, only: test_flow_accuracy
     use frb_test_flow_runs, only: test_flow_runs
     use frb_test_flow_batches, only: test_flow_batches
+    use frb_test_flow_splits, only: test_flow_splits
     use frb_test_flow_fuzz, only: test_flow_fuzz
     use frb_test_flow_columns, only: test_flow_columns
     use frb_test_flow_series, only: test_flow_series
@@ -127,6 +128,7 @@ contains
         call suite(task, 'flow-accuracy', test_flow_accuracy)
         call suite(task, 'flow-runs', test_flow_runs)
         call suite(task, 'flow-batches', test_flow_batches)
+        call suite(task, 'flow-splits', test_flow_splits)
         call suite(task, 'flow-fuzz', test_flow_fuzz)
         call suite(task, 'flow-columns', test_flow_columns)
         call suite(task, 'flow-series', test_flow_series)

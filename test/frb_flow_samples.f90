@@ -7,12 +7,13 @@ module frb_flow_samples
     use frb_quad_truth, only: long_truth
     use frb_reference_cases, only: reference_case
     use frb_rotations, only: norm3, quat_rotate
-    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_value, ieee_quiet_nan, &
+        ieee_positive_inf, ieee_negative_inf
     implicit none
     private
 
-    public :: stream, sample, random_samples, true_case, advanced, made_finite, same, near_separatrix, &
-        defect, diagonal, no_turn, no_rotation
+    public :: stream, sample, random_samples, true_case, advanced, made_finite, not_a_number, same, &
+        near_separatrix, defect, diagonal, no_turn, no_rotation
 
     real(wp), parameter :: no_turn(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
     real(wp), parameter :: no_rotation(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, &
@@ -164,6 +165,21 @@ contains
         finite = 1.0e30_wp
         if (all(ieee_is_finite(numbers))) finite = numbers
     end function made_finite
+
+    !> NaN, Inf or -Inf, without an exception.
+    pure function not_a_number(i) result(x)
+        integer, intent(in) :: i
+        real(wp) :: x
+
+        select case (mod(i, 3))
+        case (0)
+            x = ieee_value(1.0_wp, ieee_quiet_nan)
+        case (1)
+            x = ieee_value(1.0_wp, ieee_positive_inf)
+        case default
+            x = ieee_value(1.0_wp, ieee_negative_inf)
+        end select
+    end function not_a_number
 
     !> Equal to the last bit, NaN and signs of zeros included.
     pure function same(x, y) result(equal)
