@@ -1,4 +1,4 @@
-!> One exact step of a free rigid body: where it is after ten units of time, however fast it tumbles.
+!> One exact step of a free rigid body: its state after ten units of time, however fast it tumbles.
 !>
 !>   fpm run --example example1_one_step
 program example1_one_step

@@ -1,4 +1,4 @@
-!> A top in a gravity field: exact free motion (drift) between turns of the momentum by the torque (kick).
+!> A top in a gravity field: exact free motion (drift) between changes of the momentum by the torque (kick).
 !>
 !>   fpm run --example example2_kick_drift
 program example2_kick_drift
@@ -22,7 +22,7 @@ program example2_kick_drift
     q = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
     energy0 = energy()
 
-    ! Half a drift, a kick, half a drift: the error of a step is of order h^3, and reversible in time.
+    ! Half a drift, a kick, half a drift: the error of a step is of order h^3, and the step is reversible.
     do i = 1, steps
         call quat_step(m_new, q_new, h/2, moments, m, q)
         m = m_new + h*torque(q_new)

@@ -1,5 +1,5 @@
 !> A body given by its full inertia tensor, as a design program prints it: the free flow takes the tensor as
-!> it is, and principal_axes tells the moments and axes.
+!> it is, and principal_axes computes the moments and axes.
 !>
 !>   fpm run --example example3_inertia_tensor
 program example3_inertia_tensor

@@ -1,7 +1,7 @@
-!> A tumbling moon in the manner of Hyperion: moments 0.314, 0.474, 0.542 on an orbit of eccentricity 0.1,
-!> turned by the gravity of its planet. Turning once an orbit it tumbles without order: two starts 1e-8 apart
-!> part by a factor e in about an orbit. Spun up to eight turns an orbit it is regular. No tides; the orbit
-!> stays as it is.
+!> A tumbling moon like Hyperion: moments 0.314, 0.474, 0.542 on an orbit of eccentricity 0.1, turned by the
+!> gravity of its planet. With one turn per orbit the rotation is chaotic: the distance of two starts, 1e-8 at
+!> first, grows by a factor e in about an orbit. With eight turns per orbit it is regular. No tides; the orbit
+!> does not change.
 !> J. Wisdom, S. J. Peale, F. Mignard, Icarus 58 (1984) 137.
 module frb_tumbler
     use frb, only: wp, body_scene, quat_conjugate, quat_rotate, status_ok

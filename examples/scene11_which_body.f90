@@ -1,8 +1,8 @@
 !> Which body is this? Forty attitudes of a tumbling body, each good to 0.01 rad, give its momentum, its
 !> attitude and its moments up to a common factor (momentum and moments may grow together): eight numbers,
 !> fitted by Gauss and Newton with the exact derivatives of `flow_tangent` and LAPACK's least squares, from a
-!> start 10 % off. The covariance is right: over 200 draws of the noise the errors, in units of what it tells,
-!> have the mean square 1, and the residuals of the fit that of the noise.
+!> start 10 % off. The covariance is right: over 200 draws of the noise the errors, in units of their standard
+!> deviations, have the mean square 1, and the residuals of the fit that of the noise.
 module frb_fit
     use frb, only: wp, rigid_body, flow_tangent, quat_product, quat_conjugate
     use, intrinsic :: iso_fortran_env, only: int32, int64
@@ -70,8 +70,8 @@ contains
         moments(1:2) = moments(1:2)*exp(x(7:8))
     end subroutine changed
 
-    !> Fits moments, m and q to the attitudes seen at t; the covariance of the unknowns over sigma^2, the sum
-    !> of squares that is left, and the iterations it took.
+    !> Fits moments, m and q to the attitudes seen at the times t. Returns the covariance of the unknowns over
+    !> sigma^2, the sum of squares of the residuals, and the number of iterations.
     subroutine fit(t, seen, moments, m, q, covariance, left, iterations)
         real(wp), intent(in) :: t(sights), seen(4, sights)
         real(wp), intent(inout) :: moments(3), m(3), q(4)
@@ -177,7 +177,7 @@ program scene11_which_body
         residuals = residuals + left/(sigma**2*(3*sights - unknowns)*draws)
     end do
     print '(a,i0,a)', 'at most ', most, ' iterations'
-    print '(a)', 'mean squares over 200 draws, in units of what the covariance tells:'
+    print '(a)', 'mean squares over 200 draws, in units of the variances:'
     print '(a,8f6.2)', 'errors of the unknowns', mean_square
     print '(a,f6.2)', 'residuals of the fit  ', residuals
     ! 200 draws: 1 within 3 standard deviations, 0.1 each; the residuals within 0.03.
@@ -192,7 +192,7 @@ end program scene11_which_body
 !   fitted         0.61994  0.84794  1.00000
 !   +-             0.00125  0.00239
 !   at most 8 iterations
-!   mean squares over 200 draws, in units of what the covariance tells:
+!   mean squares over 200 draws, in units of the variances:
 !   errors of the unknowns  1.00  0.92  0.91  1.07  1.01  0.93  0.96  0.95
 !   residuals of the fit    1.01
 !   covariance right: T

@@ -1,6 +1,6 @@
-!> How chaotic is this top? The largest Lyapunov exponent, from the derivative of the run by its start: a
-!> variation is carried along by `integrate_tangent` and its growth summed up. A heavy top without symmetry
-!> and a tumbling moon in the manner of Hyperion are chaotic; for the free body and the Lagrange top the
+!> How chaotic is this top? The largest Lyapunov exponent, from the derivative of the run by its start:
+!> `integrate_tangent` advances a variation, and its growth is summed up. A heavy top without symmetry and a
+!> tumbling moon like Hyperion are chaotic; for the free body and the Lagrange top the
 !> exponent falls to 0 as log t/t. Rounding decides where a chaotic orbit goes, so two digits are shown.
 module frb_chaotic_moon
     use frb, only: wp, body_scene, quat_conjugate, quat_rotate, status_ok

@@ -10,8 +10,8 @@ module frb_filter
 
 contains
 
-    !> From the estimate m, q with covariance p to that after h, with the attitude `seen`, good to sigma
-    !> [rad].
+    !> Advances the estimate m, q and its covariance p by h, and corrects it by the measured attitude `seen`,
+    !> good to sigma [rad].
     subroutine filter_step(body, h, seen, sigma, m, q, p)
         type(rigid_body), intent(in) :: body
         real(wp), intent(in) :: h, seen(4), sigma
@@ -66,7 +66,7 @@ program scene13_star_tracker
     body = rigid_body([0.6_wp, 0.8_wp, 1.0_wp])
     m_true = [0.5_wp, 0.6_wp, -0.4_wp]
     q_true = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-    ! Nothing is known of the momentum, next to nothing of the attitude.
+    ! At the start the momentum is unknown, and the attitude almost unknown.
     m = 0.0_wp
     q = [cos(0.1_wp), sin(0.1_wp), 0.0_wp, 0.0_wp]
     p = 0.0_wp
@@ -74,7 +74,7 @@ program scene13_star_tracker
         p(i, i) = 1.0_wp
         p(3 + i, 3 + i) = 0.1_wp
     end do
-    print '(a)', ' time   error of m   as told   error of q [rad]   as told'
+    print '(a)', ' time   error of m   predicted   error of q [rad]   predicted'
     do k = 1, steps
         call free_flow(body, h, m_true, q_true)
         noise = sigma*[sin(7.1_wp*k), cos(3.3_wp*k), sin(5.7_wp*k + 1)]*sqrt(2.0_wp)
@@ -87,7 +87,7 @@ program scene13_star_tracker
 end program scene13_star_tracker
 
 ! Output:
-!   time   error of m   as told   error of q [rad]   as told
+!   time   error of m   predicted   error of q [rad]   predicted
 !   5.0     8.4E-04     4.4E-04        1.4E-03        8.9E-04
 !   10.0     3.4E-04     4.1E-04        7.7E-04        7.0E-04
 !   15.0     1.9E-04     3.1E-04        7.2E-04        5.6E-04

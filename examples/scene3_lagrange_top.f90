@@ -1,6 +1,5 @@
-!> A Lagrange top (I1 = I2, centre of mass on axis 3, unit weight): spins, precesses and nods. Energy and the
-!> momenta about the vertical and about its own axis are conserved, so the top checks itself without a
-!> reference.
+!> A Lagrange top (I1 = I2, centre of mass on axis 3, unit weight): it spins, precesses and nods. Its energy
+!> and its momenta about the vertical and about its own axis are conserved: the run needs no reference.
 program scene3_lagrange_top
     use frb, only: wp, rigid_body, heavy_top, splitting_scheme, integrate, quat_rotate, spatial_momentum, &
         total_energy

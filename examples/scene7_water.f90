@@ -1,7 +1,7 @@
-!> A drop of 64 rigid water molecules: a loop of one's own with centres, momenta, attitudes and angular
-!> momenta, in batches: `run_water` in water_model.inc. With velocity Verlet the splitting between forces and
-!> motion makes the whole error, and the exact rotation gains nothing over the turns of NO_SQUISH; they hold a
-!> scheme of order 4 at order 2.
+!> A drop of 64 rigid water molecules: a loop written by a user, with centres, momenta, attitudes and angular
+!> momenta, in batches: `run_water` in water_model.inc. With velocity Verlet nearly all error comes from the
+!> splitting between forces and motion, and the exact rotation gains nothing over the turns of NO_SQUISH. With
+!> a scheme of order 4 these turns, of order 2, make the error much larger.
 !>
 !> `scene7_water 20` runs for 20 ps instead of 1.
 module frb_water
@@ -40,7 +40,7 @@ contains
     subroutine compare(scheme, h)
         type(splitting_scheme), intent(in) :: scheme
         real(wp), intent(in) :: h
-        real(wp), parameter :: spacing = 12.0_wp        ! of looks at the energy [fs]
+        real(wp), parameter :: spacing = 12.0_wp        ! time between samples of the energy [fs]
         real(wp) :: rms(2)
 
         call run_water(splitting_plan(scheme, h), h, 1000*picoseconds, spacing, .false., start, rms(1))

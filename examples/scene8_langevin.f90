@@ -1,7 +1,8 @@
-!> Tops in a heat bath: BAOAB, the kicks of torque and bath around the exact free rotation. Free bodies keep
-!> the canonical distribution at any step, since rotation and bath keep it each by itself:
+!> Tops in a heat bath: BAOAB, with kicks of torque and bath around the exact free rotation. Free bodies keep
+!> the canonical distribution at any step, because the rotation keeps it and the bath keeps it:
 !> <m_k^2/(I_k kT)> = 1 within the error of a million samples. Under the torque of V = w u3 the momenta have a
-!> bias of order h^2; the attitudes, against the exact <u3> = 1/x - coth x with x = w/kT, a much smaller one.
+!> bias of order h^2. The bias of the attitudes, against the exact <u3> = 1/x - coth x with x = w/kT, is much
+!> smaller.
 module frb_bath
     use, intrinsic :: iso_fortran_env, only: int64
     use frb, only: wp

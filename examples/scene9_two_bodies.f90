@@ -1,8 +1,8 @@
 !> An ellipsoid of 200 m by 160 m by 120 m on an orbit about a sphere of 0.8 km: a moon of an asteroid. Both
 !> pull each other, gravity to second degree in size over distance: with x from sphere to ellipsoid and
-!> u = x/r, V = -G M m/r - G M (tr I - 3 u . I u)/(2 r^3). A loop of one's own with x, p, m, q: the sum of the
-!> angular momenta of orbit and spin is kept to rounding, the energy to the error of the scheme. No tides.
-!> Lengths in km, times in h, masses in 1e12 kg.
+!> u = x/r, V = -G M m/r - G M (tr I - 3 u . I u)/(2 r^3). A loop written by a user, with x, p, m, q: the sum
+!> of the angular momenta of orbit and spin is kept to rounding, the energy to the error of the scheme. No
+!> tides. Lengths in km, times in h, masses in 1e12 kg.
 module frb_pair
     use frb, only: wp, quat_conjugate, quat_rotate
     implicit none

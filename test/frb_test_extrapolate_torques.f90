@@ -4,13 +4,13 @@ module frb_test_extrapolate_torques
     use frb_extrapolation, only: extrapolate, extrapolation_report
     use frb_free_flow, only: rigid_body
     use frb_kinds, only: wp
-    use frb_rotations, only: cross, quat_conjugate, quat_product, quat_rotate, quat_to_matrix
+    use frb_rotations, only: quat_conjugate, quat_product, quat_rotate, quat_to_matrix
     use frb_scenes, only: heavy_top
     use frb_schemes, only: splitting_scheme
     use frb_splitting, only: integrate
     use frb_status, only: status_ok, status_bad_momentum, status_bad_torque, status_too_rough
     use frb_torque, only: body_scene
-    use frb_torque_cases, only: top_case, known_top, distance, pulsed_torque, spoilt_torque
+    use frb_torque_cases, only: top_case, known_top, distance, pulsed_torque, spoilt_torque, turning_top
     implicit none
     private
 
@@ -40,12 +40,6 @@ module frb_test_extrapolate_torques
     contains
         procedure :: torque => noise
     end type noisy_torque
-
-    !> A force that turns with time. Torques in lanes must be its own, not those of its parent.
-    type, extends(heavy_top) :: turning_force
-    contains
-        procedure :: torque => torque_of_turning_force
-    end type turning_force
 
     real(wp), parameter :: eps = epsilon(1.0_wp)
 
@@ -105,7 +99,7 @@ contains
         type(spoilt_torque) :: spoilt
         type(switched_torque) :: switch
         type(noisy_torque) :: noisy
-        type(turning_force) :: turning
+        type(turning_top) :: turning
         type(scalar_top) :: refusing, late
         type(rigid_body) :: body
         type(extrapolation_report) :: report
@@ -276,17 +270,5 @@ contains
         end do
         stat = status_ok
     end subroutine noise
-
-    pure subroutine torque_of_turning_force(self, q, t, tau, stat)
-        class(turning_force), intent(inout) :: self
-        real(wp), intent(in) :: q(4), t
-        real(wp), intent(out) :: tau(3)
-        integer, intent(out) :: stat
-
-        associate (unused => self)
-        end associate
-        tau = cross(quat_rotate(quat_conjugate(q), [sin(2*t), 0.0_wp, cos(2*t)]), [0.0_wp, 0.0_wp, 1.0_wp])
-        stat = status_ok
-    end subroutine torque_of_turning_force
 
 end module frb_test_extrapolate_torques

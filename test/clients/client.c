@@ -1,5 +1,5 @@
-/* What a C or C++ program gets from the installed library: the bits of the results, one a line; client.f90 prints
- * the same. */
+/* Results of the installed library in a C or C++ program: their bits, one number a line; client.f90 prints the same
+ * lines. */
 #include <frb.h>
 #include <stdio.h>
 #include <stdlib.h>

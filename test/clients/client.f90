@@ -1,4 +1,4 @@
-! What a Fortran program gets from the installed library, as client.c prints it.
+! Results of the installed library in a Fortran program, printed as by client.c.
 program client
     use, intrinsic :: iso_fortran_env, only: int64
     use frb, only: wp, rigid_body, free_flow, flow_tangent, free_motion, heavy_top, integrate, &

@@ -1,5 +1,5 @@
-/* Everything a caller can do wrong, to be run under valgrind: refused by a status, nothing read or written that is not
- * the caller's. */
+/* Wrong calls of all kinds, to be run under valgrind: each is refused by a status, and only memory of the caller is read
+ * or written. */
 #include <frb.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-"""What the Python package gives: the lines of client.f90, bit for bit; then its refusals."""
+"""Results of the Python package: the lines of client.f90, bit for bit; then the input that it refuses."""
 import struct
 import sys
 

@@ -1,4 +1,4 @@
-! Names that a user's program has always had, beside all those of the library.
+! A user's own variables with the short names of elliptic functions, beside all names of the library.
 program short_names
     use frb
     implicit none

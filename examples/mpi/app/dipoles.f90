@@ -1,7 +1,7 @@
-!> The lattice of dipoles of scene 6 over the ranks of MPI: every rank owns a block of them and integrates it;
-!> a torque first gathers the dipoles of all. The energies are those of one rank to all printed digits.
+!> The lattice of dipoles of scene 6 over the ranks of MPI: every rank owns and integrates a block of dipoles;
+!> a torque first gathers the dipoles of all ranks. All printed digits of the energies are those of one rank.
 !>
-!> `dipoles fail` makes a torque of the last rank NaN on the way: all ranks end together with the same status.
+!> `dipoles fail` makes a torque of the last rank NaN during the run: all ranks end with the same status.
 module frb_dipole_ranks
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
     use frb, only: wp, group_scene, quat_conjugate, quat_rotate, status_ok
@@ -17,7 +17,7 @@ module frb_dipole_ranks
         real(wp), allocatable :: dipoles(:, :)          ! (3, all), gathered anew for each torque
         real(wp), allocatable :: mine(:, :), field(:, :)    ! (3, own)
         integer, allocatable :: counts(:), starts(:)    ! of numbers, three a body, on each rank
-        integer :: first = 1                            ! of the own bodies among all
+        integer :: first = 1                            ! number of the first own body among all bodies
         integer :: calls = 0
         integer :: fails_at = 0                         ! the call whose torque is NaN; 0: none
     contains
@@ -46,7 +46,7 @@ contains
         allocate (lattice%mine(3, own), lattice%field(3, own))
     end function new_lattice
 
-    !> The dipoles of all, and the field of all others at the own ones, in space.
+    !> The dipoles of all ranks, and the field of all others at the own dipoles, in space.
     subroutine look_around(self, q)
         class(dipole_ranks), intent(inout) :: self
         real(wp), intent(in) :: q(:, :)
@@ -93,7 +93,7 @@ contains
         stat = status_ok
     end subroutine torques
 
-    !> Of all, the same on every rank.
+    !> The potential of all dipoles, the same on every rank.
     subroutine potential(self, q, t, v, stat)
         class(dipole_ranks), intent(inout) :: self
         real(wp), contiguous, intent(in) :: q(:, :)
@@ -110,7 +110,7 @@ contains
         stat = status_ok
     end subroutine potential
 
-    !> What one rank has to refuse ends the run of all.
+    !> If one rank refuses, the run ends on all ranks.
     subroutine agree(self, code)
         class(dipole_ranks), intent(inout) :: self
         integer, intent(inout) :: code
