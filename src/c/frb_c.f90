@@ -149,9 +149,9 @@ contains
         real(c_double), intent(inout) :: m(:, :)            !! the first 3 rows
         integer, intent(out) :: code
         real(c_double), intent(inout), optional :: q(:, :)  !! the first 4 rows
-        type(body_core), pointer :: one
-        type(body_core) :: near(chunk)
-        real(c_double) :: near_m(3, chunk), near_q(4, chunk)
+        type(body_core), pointer :: given
+        type(body_core) :: part(chunk)
+        real(c_double) :: part_m(3, chunk), part_q(4, chunk)
         integer :: first, last, count, bodies, code_here, i
 
         code = status_ok
@@ -162,20 +162,20 @@ contains
             if (size(words, 2) > 1 .or. first == 1) then
                 bodies = min(count, size(words, 2))
                 do i = 1, bodies
-                    call c_f_pointer(c_loc(words(1, first + i - 1)), one)
-                    near(i) = body_core()
-                    if (usable(one)) near(i) = one
+                    call c_f_pointer(c_loc(words(1, first + i - 1)), given)
+                    part(i) = body_core()
+                    if (usable(given)) part(i) = given
                 end do
             end if
-            near_m(:, :count) = m(:3, first:last)
+            part_m(:, :count) = m(:3, first:last)
             if (present(q)) then
-                near_q(:, :count) = q(:4, first:last)
-                call flow_many(near, bodies, [h], 1, count, near_m, code_here, near_q)
-                q(:4, first:last) = near_q(:, :count)
+                part_q(:, :count) = q(:4, first:last)
+                call flow_many(part, bodies, [h], 1, count, part_m, code_here, part_q)
+                q(:4, first:last) = part_q(:, :count)
             else
-                call flow_many(near, bodies, [h], 1, count, near_m, code_here)
+                call flow_many(part, bodies, [h], 1, count, part_m, code_here)
             end if
-            m(:3, first:last) = near_m(:, :count)
+            m(:3, first:last) = part_m(:, :count)
             code = max(code, code_here)
         end do
     end subroutine flow_strided

@@ -41,7 +41,7 @@ module frb_agm
     real(wp), parameter :: small_angle = 1.0e-8_wp
 
     !> Where y(n)/y(n+1) is above this ratio, rounding makes the angle 0 or pi.
-    real(wp), parameter :: far = 1.0e20_wp
+    real(wp), parameter :: largest_ratio = 1.0e20_wp
 
     !> pi as a sum of two parts. The first has 30 bits: its product with a count below 2**23 is exact.
     real(wp), parameter :: pi_high = 3.1415926516056060791015625_wp
@@ -282,7 +282,7 @@ contains
             y = cosine/height
             turns = 0.0_wp
             do n = 0, agm%steps - 1
-                if (abs(y) < agm%product(n)*(1/far)) y = agm%product(n)*(1/far)
+                if (abs(y) < agm%product(n)*(1/largest_ratio)) y = agm%product(n)*(1/largest_ratio)
                 turns = 2*turns
                 if (y < 0.0_wp) turns = turns + 1
                 y = y - agm%product(n)/y
@@ -355,7 +355,7 @@ contains
             y = -y
             count = count + merge(-1, 1, y < 0.0_wp)
         end if
-        y = agm%top*y/max(sine, 1/far)
+        y = agm%top*y/max(sine, 1/largest_ratio)
         w = sqrt(y*y + agm%square(agm%steps))
         do n = agm%steps - 1, 0, -1
             negative = btest(count, 0)

@@ -220,7 +220,7 @@ contains
         end do
         if (maxval(abs(defect)) > consistency_tolerance) then
             error = file%complaint('Q', 'an orthogonal matrix, column by column', &
-                                   'one that misses Q^T Q = 1 by '//text(maxval(abs(defect))))
+                                   'a matrix whose Q^T Q differs from 1 by '//text(maxval(abs(defect))))
             return
         end if
         if (dot_product(matrix(:, 1), cross(matrix(:, 2), matrix(:, 3))) < 0.0_wp) then
