@@ -1,4 +1,4 @@
-!> Drifts by name, to be compared in the same loop: the free flow and the paper's two steps, exact or
+!> Drifts by name, for comparisons in the same loop: the free flow and the paper's two steps, exact or
 !> semi-exact.
 module frb_drifts
     use frb_flow_axes, only: turn_back
@@ -90,7 +90,7 @@ contains
         call free_flow(body, h, m, q, stat)
     end subroutine advance_by_flow
 
-    !> The turn as a matrix from the identity, then a quaternion: q times it.
+    !> The turn of the body as a matrix, by a step from the identity; q is multiplied by its quaternion.
     subroutine advance_by_matrix(self, body, h, m, q, stat)
         class(matrix_drift), intent(in) :: self
         type(rigid_body), intent(in) :: body
@@ -119,7 +119,8 @@ contains
         end if
     end subroutine advance_by_matrix
 
-    !> q goes along, or the turn alone where it is needed in other axes.
+    !> A step of m and q; if the body axes are not principal, a step from the identity gives the turn of the
+    !> body.
     subroutine advance_by_quaternion(self, body, h, m, q, stat)
         class(quaternion_drift), intent(in) :: self
         type(rigid_body), intent(in) :: body
@@ -144,7 +145,8 @@ contains
     end subroutine advance_by_quaternion
 
     !> The change of m when the body turns by the unit quaternion r: m is constant in space. n - old would
-    !> have no digits below those of m, and |m| drifts where the axes, all but aligned, mix in less.
+    !> lose the digits below those of m. With nearly principal axes the rotation of m is in these digits, and
+    !> |m| would drift.
     pure function change_by(r, m) result(change)
         real(wp), intent(in) :: r(4), m(3)
         real(wp) :: change(3)

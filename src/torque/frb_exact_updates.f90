@@ -1,8 +1,9 @@
-!> Updates of a compensated run: a state is x + rest, rest about half a unit of the last digit of x.
+!> Updates of a compensated run: the state is the unevaluated sum x + rest, |rest| <= about half a unit of the
+!> last digit of x.
 !>
-!> Leading products are exact: numbers are cut in two, x = a + b, where a is a multiple of a unit that all
-!> numbers of its kind share and has 26 bits at most. Products of such parts and sums of these fit in 53 bits,
-!> whether or not the compiler joins them to multiply-adds; all that is rounded is smaller by 2^-24.
+!> Leading products are exact: a number is cut in two parts, x = a + b, where a has 26 bits at most and is a
+!> multiple of a unit common to all numbers of its kind. Products of such parts and sums of these products fit
+!> in 53 bits, with and without fused multiply-adds; all rounded terms are smaller by 2^-24.
 module frb_exact_updates
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
@@ -34,7 +35,8 @@ contains
         end do
     end subroutine kick_state
 
-    !> One component. The new m waits neither for the parts of tau nor for m_rest, which the drift adds to it.
+    !> One component. The new m does not depend on the parts of tau or on m_rest, so the drift can begin
+    !> early.
     pure subroutine kick_one(h, h_a, h_b, tau, tau_a, m, m_rest)
         real(wp), intent(in) :: h, h_a, h_b, tau, tau_a
         real(wp), intent(inout) :: m, m_rest
@@ -101,7 +103,7 @@ contains
         call add(m(2), m_rest(2), change(2))
         call add(m(3), m_rest(3), change(3))
         call keep_norm_and_energy(body, rr, high, low, m, m_rest, q, q_rest)
-        ! Back to half a unit: the next drift turns m and not the rest, and a larger one would grow by it.
+        ! m_rest back to half a unit: the next drift turns m alone, and the error of this grows with m_rest.
         change = m_rest
         call add(m(1), m_rest(1), change(1))
         call add(m(2), m_rest(2), change(2))
@@ -142,13 +144,13 @@ contains
         low = (e_n*(a + d) + e*(a_n + d_n + e_n)) + (b*(d_n + e_n) + b_n*(d + e))
     end subroutine product_change
 
-    !> Takes back what rounding did to |m|, by a change along m, and to the kinetic energy, by a turn v of m
-    !> and q, of a few units of the last digit of the drift's turn; rr is the square of the vector of that,
-    !> high + low are the changes of the squares of m, and of m2 m3, m3 m1, m1 m2 for a body that needs them.
-    !> Where a drift does not keep the energy to rounding it is left as it is.
+    !> Removes rounding errors of |m|, by a change along m, and of the kinetic energy, by a turn v of m and q
+    !> of a few units of the last digit of the drift's turn. rr is the square of the vector part of this turn;
+    !> high + low are the changes of the squares of m, and of m2 m3, m3 m1, m1 m2 for a body by a tensor. If a
+    !> drift does not keep the energy to rounding, nothing is removed from the energy.
     !>
     !> The motion magnifies these two errors in proportion to the time, and under a weak torque no others.
-    !> 2 T is m . K m but for what |m| gives, in sorted axes beta m1^2 + alpha m2^2; k is K m x m.
+    !> 2 T is m . K m plus a multiple of |m|^2, in sorted axes beta m1^2 + alpha m2^2; k is K m x m.
     pure subroutine keep_norm_and_energy(body, rr, high, low, m, m_rest, q, q_rest)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: rr, high(6), low(6), m(3), q(4)
@@ -182,7 +184,7 @@ contains
         q_rest(4) = q_rest(4) + (q(1)*v3 + q(2)*v2 - q(3)*v1)
     end subroutine keep_norm_and_energy
 
-    !> The change of m . K m, once |m| is taken back by `stretch`, and k, in principal axes.
+    !> The change of m . K m, after |m| is corrected by `stretch`, and k, in principal axes.
     pure subroutine sorted_defect(body, stretch, high, low, m, defect, k)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: stretch, high(3), low(3), m(3)
@@ -211,7 +213,7 @@ contains
                     + (2*stretch)*(body%beta*(m1*m1) + body%alpha*(m2*m2)))
     end subroutine sorted_defect
 
-    !> The same for a body given by a tensor, in its axes: K has six elements, products of m go with it.
+    !> The same for a body given by a tensor, in its axes: K has six elements, and products of m are needed.
     pure subroutine turned_defect(body, stretch, high, low, m, defect, k)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: stretch, high(6), low(6), m(3)
@@ -232,7 +234,7 @@ contains
                                                                            + (2*stretch)*dot_product(n, m)))
     end subroutine turned_defect
 
-    !> x + change, and in rest what x then lacks (Knuth).
+    !> x + change; rest receives the rounding error of the sum (Knuth).
     pure subroutine add(x, rest, change)
         real(wp), intent(inout) :: x
         real(wp), intent(out) :: rest

@@ -1,7 +1,7 @@
 !> One body under torque to a given accuracy: Strang's splitting with the exact free flow, extrapolated.
 !>
-!> S(h) is kick by h/2, drift by h, kick by h/2. Over a step H the results of S(H/n)^n for n = 2..8 are put
-!> together with the weights c_n = prod_(j /= n) n^2/(n^2 - j^2): as S is symmetric in time, its error has
+!> S(h) is kick by h/2, drift by h, kick by h/2. Over a step H the results of S(H/n)^n for n = 2..8 are
+!> combined with the weights c_n = prod_(j /= n) n^2/(n^2 - j^2): as S is symmetric in time, its error has
 !> even powers of h only, and seven sequences give order 14 (a multi-product expansion: S. A. Chin, Celest.
 !> Mech. Dyn. Astron. 106 (2010) 391). Without the coarsest sequence they give order 12: the difference is the
 !> estimate of the error of a step. The sequences share the lanes of a vector, two in a lane: 8, 2 + 7, 3 + 6,
@@ -26,12 +26,12 @@ module frb_extrapolation
 
     public :: extrapolate, extrapolation_report
 
-    !> What `extrapolate` did.
+    !> Report of a run of `extrapolate`.
     type :: extrapolation_report
         integer(int64) :: steps = 0         !! steps taken
-        integer(int64) :: rejected = 0      !! steps tried in vain
-        integer(int64) :: torques = 0       !! attitudes at which the torque was asked for
-        real(wp) :: tolerance = 0.0_wp      !! the tolerance held: not below the rounding of a step
+        integer(int64) :: rejected = 0      !! steps rejected
+        integer(int64) :: torques = 0       !! number of attitudes for which the scene computed a torque
+        real(wp) :: tolerance = 0.0_wp      !! the tolerance in use: not below the rounding of a step
         real(wp) :: largest_error = 0.0_wp  !! largest estimate of the error of a step taken, relative
         real(wp) :: shortest = 0.0_wp       !! shortest step taken but the last
         real(wp) :: longest = 0.0_wp        !! longest step taken
@@ -41,38 +41,38 @@ module frb_extrapolation
     !> `call extrapolate(body, scene, time, m, q, tolerance, t, observer, step, compensated, stat, report)`.
     !>
     !> `tolerance` bounds the estimated error of each step, relative to the largest entries of m and of q; any
-    !> value from 1 to 0. What a step cannot hold for rounding, below 5e-15, counts as 5e-15: `report` tells
-    !> the tolerance held, the largest estimate, steps and torques. It is of the size of the error, for loose
-    !> tolerances up to six times too low. Errors of steps add up and grow with the motion: on the
+    !> value from 1 to 0. A tolerance below 5e-15, the rounding of a step, counts as 5e-15: `report` has the
+    !> tolerance in use, the largest estimate, steps and torques. The estimate has the size of the error; for
+    !> loose tolerances it is up to six times too low. Errors of steps add up and grow with the motion: on the
     !> Hairer-Vilmart top 1e-10 gives 5e-10 at T = 10 and 2e-8 at T = 100.
     !>
-    !> A body that feels no torque is moved by the free flow, in one step, exactly. (A torque that is zero at
-    !> the times of a step, 22 to 36, and shorter than the gaps goes unseen: then bound the step by `step`.)
-    !> A torque that is switched on or off at some time is found by ever shorter steps.
+    !> Without any torque the free flow moves the body, in one step, exactly. (A pulse of torque between the
+    !> 22 to 36 times of a step is missed: then bound the step by `step`.) Where a torque is switched on or
+    !> off, the steps become short.
     !>
-    !> `step` > 0 switches the adaptation off: equal steps of at most this size, the tolerance choosing the
-    !> sequences. `observer` sees the start and every step. `compensated`, the default, carries the rounding
-    !> error of m and q to the next step; it costs nothing. For many times along a run that has no observer
-    !> call again with `t`.
+    !> `step` > 0 switches the adaptation off: equal steps of at most this size; the tolerance only chooses
+    !> the sequences. `observer` sees the start and every step. `compensated`, the default, carries the
+    !> rounding error of m and q to the next step; it costs nothing. For states at many times without an
+    !> observer, call `extrapolate` for one interval after another, with `t`.
     !>
-    !> The scene's `torque_lanes` is asked for eight attitudes and times at once, the last four the first
-    !> four again; 22 to 36 different ones a step, one of them by `torque`. By default that is `torque` four
-    !> times.
+    !> One call of the scene's `torque_lanes` is for eight attitudes and times, of which the last four repeat
+    !> the first four. A step has 22 to 36 different attitudes, one of them by `torque`. The default
+    !> `torque_lanes` calls `torque` four times.
     !>
-    !> When to take what: see frb_splitting. This is not symplectic and not reversible: the energy drifts by
-    !> the error of the steps, which can be held near rounding up to T = 1e5 or so.
+    !> frb_splitting says when to use which method. This one is not symplectic and not reversible: the energy
+    !> drifts by the error of the steps, which can be near rounding up to about T = 1e5.
     !>
     !> Refused with `stat`, the state untouched: a body that could not be made; m not finite; q not finite or
     !> its norm more than 1e-6 off one; time, t or step not finite, |time| > 1e300, step < 0 or too small to
-    !> count (`status_bad_time`); tolerance negative or not finite (`status_bad_option`). What ends a run
-    !> later leaves m, q and t of the last step: the code that a torque returns; a torque that is not finite
-    !> (`status_bad_torque`) or so rough that 10 000 steps in a row are a millionth of what a smooth one would
-    !> take (`status_too_rough`); a momentum along the axis of a linear rotor (`status_bad_momentum`); an
-    !> observer (`status_stopped`; without `stat` the call then returns).
+    !> count (`status_bad_time`); tolerance negative or not finite (`status_bad_option`). A run that ends
+    !> early leaves m, q and t of the last step. It ends by the code that a torque returns; a torque that is
+    !> not finite (`status_bad_torque`) or so rough that 10 000 steps in a row are a millionth of the step for
+    !> a smooth torque (`status_too_rough`); a momentum along the axis of a linear rotor
+    !> (`status_bad_momentum`); an observer (`status_stopped`; without `stat` the call then returns).
     !>
-    !> n bodies that do not see each other, all in the same scene: m is (3, n), q is (4, n), the body a scalar
-    !> or body(n), without an observer. Each takes steps of its own; one that is refused keeps the state it
-    !> got to, and the others go on. (Bodies side by side in the lanes would not be faster: the sequences of
+    !> n bodies that do not interact, all in the same scene: m is (3, n), q is (4, n), the body a scalar or
+    !> body(n), without an observer. Each body has its own steps; a body that is refused keeps the state it
+    !> reached, and the others go on. (Bodies side by side in the lanes would not be faster: the sequences of
     !> one body fill 35 of 36 places, and two vectors take twice as long as one.)
     interface extrapolate
         module procedure extrapolate_body
@@ -122,7 +122,7 @@ contains
             if (present(t)) t = t_now
         end if
         if (present(report)) report = told
-        ! An observer that stops a run has done what it was there for.
+        ! A stop by an observer is no error.
         if (code == status_stopped .and. .not. present(stat)) return
         call conclude(code, 'extrapolate', stat)
     end subroutine extrapolate_body
@@ -185,7 +185,7 @@ contains
         call conclude(code, 'extrapolate', stat)
     end subroutine extrapolate_bodies
 
-    !> What is wrong with times and tolerance, if anything.
+    !> `status_ok`, or the error in times and tolerance.
     pure function check_times(time, start, fixed, tolerance) result(code)
         real(wp), intent(in) :: time, start, fixed, tolerance
         integer :: code
@@ -242,7 +242,7 @@ contains
             call try_step(moved, scene, t_now, sign(h, time), h > 1.01_wp*reach, &
                           first_terms_do(moved, h/reach, few_angle), told%torques, refused)
             if (code == status_ok) code = refused
-            ! A step that is rejected is shortened without end only where there is a NaN.
+            ! Only NaN can cause rejected steps without end.
             ratio = min(moved%error, 1.0_wp)/told%tolerance
             accepted = ratio <= 1.0_wp .or. fixed > 0.0_wp .or. h <= least
             if (code == status_ok .and. accepted .and. .not. moved%is_finite) code = status_bad_torque
@@ -258,7 +258,7 @@ contains
             left = merge(0.0_wp, left - sign(h, time), last)
             t_now = merge(start + time, start + (time - left), last)
             call note_step(told, h, moved%error, last)
-            ! The guess says nothing where there was no torque at first.
+            ! The guess has no meaning if there was no torque at the start.
             short_steps = merge(short_steps + 1, 0, h < 1.0e-6_wp*min(guess, reach) &
                                 .and. .not. fixed > 0.0_wp)
             if (code == status_ok .and. short_steps > 10000) code = status_too_rough
@@ -267,14 +267,14 @@ contains
             end if
             if (last) exit
             h = h*min(step_factor(ratio, moved%set), 4.0_wp)
-            ! The mean, on a logarithmic scale, of this and what was to follow the step before: it follows
-            ! less what the estimate does from step to step, which saves 8 % of the steps.
+            ! The geometric mean of this size and the size found after the step before: changes of the
+            ! estimate from step to step have less effect, which saves 8 % of the steps.
             if (before > 0.0_wp) h = sqrt(h)*sqrt(before)
             before = h
         end do
     end subroutine run_steps
 
-    !> Takes a step that was accepted into the report.
+    !> Adds an accepted step to the report.
     pure subroutine note_step(told, h, error, last)
         type(extrapolation_report), intent(inout) :: told
         real(wp), intent(in) :: h, error

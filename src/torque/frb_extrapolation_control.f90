@@ -1,4 +1,4 @@
-!> How long the steps of `extrapolate` are: see frb_extrapolation.
+!> The choice of step sizes of `extrapolate`: see frb_extrapolation.
 module frb_extrapolation_control
     use frb_extrapolation_sets, only: powers, reaches
     use frb_extrapolation_step, only: extrapolated_body, ask_torque, accept_step
@@ -15,8 +15,8 @@ module frb_extrapolation_control
 
 contains
 
-    !> The first step to be tried, by the torque at the start or, where a body feels none there, by that where
-    !> the free body will be after half a radian.
+    !> The first step to be tried, from the torque at the start; if this is zero, from the torque at the state
+    !> of the free body after half a radian.
     function first_step(moved, scene, t, left, tolerance, asked) result(h)
         type(extrapolated_body), intent(in) :: moved
         class(body_scene), intent(inout) :: scene
@@ -48,13 +48,13 @@ contains
         if (rate > 1/abs(left)) h = sign(0.5_wp/rate, left)
         ahead%is_free = .true.
         call accept_step(ahead, h, code)
-        ! What it refuses there, it refuses when a step gets there.
+        ! If the scene refuses this state, it does so again when a step reaches it.
         if (code == status_ok) call ask_torque(ahead, scene, t + h, asked, code)
         torque = ahead%tau
     end function torque_ahead
 
-    !> The step h, or one that divides what is left, if that is not much longer; a little longer than h if
-    !> that saves one.
+    !> The step h, or near the end an equal part of the time left, so that no very short step remains; a
+    !> little longer than h if this saves a step.
     pure function without_sliver(h, left) result(chosen)
         real(wp), intent(in) :: h, left
         real(wp) :: chosen
@@ -83,8 +83,7 @@ contains
         h = (tolerance/constants(moved%set)*ratio)**(1.0_wp/powers(moved%set))/rate
     end function step_for
 
-    !> How long a step may be for the series of the lanes: the half angle of its shortest drifts is then below
-    !> 0.5.
+    !> The longest step for the series of the lanes: the half angle of its shortest drifts is then below 0.5.
     pure function series_reach(moved) result(h)
         type(extrapolated_body), intent(in) :: moved
         real(wp) :: h
@@ -96,8 +95,9 @@ contains
         if (rate > 8/longest) h = reaches(moved%set)/rate
     end function series_reach
 
-    !> Whether the first terms of the series do for a step, part of their reach: what is left out then changes
-    !> it by less than its own error does, as measured on tops. Under a strong torque that error is larger.
+    !> Whether the first terms of the series suffice for a step, given as a part of their longest step: the
+    !> terms left out are then smaller than the error of the step, as measured on tops. Under a strong torque
+    !> this error is larger.
     pure function first_terms_do(moved, part, angle) result(do_it)
         type(extrapolated_body), intent(in) :: moved
         real(wp), intent(in) :: part
@@ -113,8 +113,8 @@ contains
         do_it = acceleration > strong*(moved%core%a(1)*norm3(moved%x(1:3)))**2
     end function first_terms_do
 
-    !> The step h, or that of the series if it is not much shorter: the free flow takes some four times as
-    !> long as they do.
+    !> The step h, or the longest step of the series if it is not much shorter: the free flow takes about four
+    !> times as long as the series.
     pure function within_reach(reach, h) result(chosen)
         real(wp), intent(in) :: reach, h
         real(wp) :: chosen
@@ -123,9 +123,9 @@ contains
         if (h > reach .and. h < 5*reach) chosen = reach
     end function within_reach
 
-    !> By how much longer the next step should be than one whose error is `ratio` times the tolerance.
-    !> 0.77: the estimate changes by a factor of ten from step to step where the torque is strong, and a step
-    !> in vain costs as much as any other.
+    !> Factor from a step with an error of `ratio` times the tolerance to the next step. 0.77: under a strong
+    !> torque the estimate changes by a factor of ten from step to step, and a rejected step costs as much as
+    !> any other.
     pure function step_factor(ratio, set) result(factor)
         real(wp), intent(in) :: ratio
         integer, intent(in) :: set      !! of sequences

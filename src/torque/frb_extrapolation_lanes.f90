@@ -13,9 +13,9 @@ module frb_extrapolation_lanes
     public :: lanes, state_of_lanes, form_of_step, chosen_form, start_lanes, end_sequences, kick_and_drift, &
         kick_and_drift_few
 
-    !> One of the two forms of the turn: axes of the body in the order of the formulas, the third one turned
-    !> round if need be so that they are right-handed, and the constants of the body for them. The mirror form
-    !> is the first one with descending moments: alpha, beta, gamma are then negative.
+    !> One of the two forms of the turn: axes of the body in the order of the formulas, the third axis
+    !> reversed if necessary to make them right-handed, and the constants of the body in these axes. The
+    !> mirror form is the first form with descending moments: alpha, beta, gamma are then negative.
     type :: form_of_step
         integer :: axis(3) = [1, 2, 3]
         real(wp) :: sign3 = 1.0_wp
@@ -24,11 +24,11 @@ module frb_extrapolation_lanes
 
     integer, parameter :: lanes = 4     !! sequences advanced at a time
 
-    !> The lanes of a step that is tried; m in the axes of the form, all else in those of the body. A scene is
-    !> asked for the torque of scene_lanes attitudes: those beyond `lanes` repeat the first ones.
+    !> The lanes of a step that is tried; m in the axes of the form, other vectors in body axes. A scene
+    !> computes torques for scene_lanes attitudes: attitudes beyond `lanes` repeat the first ones.
     type :: state_of_lanes
         real(wp) :: m(lanes, 3), q(scene_lanes, 4)
-        real(wp) :: m_rest(lanes, 3), q_rest(lanes, 4)      !! what m and q lack
+        real(wp) :: m_rest(lanes, 3), q_rest(lanes, 4)      !! rounding errors of m and q
         real(wp) :: tau(scene_lanes, 3)
         real(wp) :: sizes(lanes)                            !! of all torques so far
         real(wp) :: change(lanes, 7), error(lanes, 7)       !! weighted changes of (m, q)
@@ -54,9 +54,9 @@ contains
         end if
     end function chosen_form
 
-    !> All lanes at the start of a step: x = (m, q) in the axes of the form and of the body, what x lacks, and
-    !> the torque there. Whole vectors here and below, in one loop over the lanes: one of which a lane was
-    !> stored by itself has to wait to be loaded.
+    !> All lanes at the start of a step: x = (m, q) in the axes of the form and of the body, its rounding
+    !> error, and the torque. One loop over all lanes, here and below, stores whole vectors: loading a vector
+    !> after storing a single lane of it would wait.
     pure subroutine start_lanes(start, rest, torque, state)
         real(wp), intent(in) :: start(7), rest(7), torque(3)
         type(state_of_lanes), intent(out) :: state
@@ -86,8 +86,8 @@ contains
         state%error = 0.0_wp
     end subroutine start_lanes
 
-    !> Ends sequences: adds what each has changed, its last kick by h kick tau included, with its weights,
-    !> which are 0 in a lane that goes on. Lanes with begin = 1 are then at the start again.
+    !> Ends sequences: adds the change by each sequence, with its last kick by h kick tau, times its weights,
+    !> which are 0 in a lane that goes on. Lanes with begin = 1 return to the start.
     pure subroutine end_sequences(form, h, kick, weight, difference, begin, start, rest, torque, state)
         type(form_of_step), intent(in) :: form
         real(wp), intent(in) :: h, start(7), rest(7), torque(3)
@@ -126,7 +126,7 @@ contains
         end do
     end subroutine end_sequences
 
-    !> The same for one number of the state of one lane, after a last kick.
+    !> Ends a sequence for one number of the state of one lane, after the last kick.
     pure subroutine end_number(begin, weight, difference, start, start_rest, last, x, rest, change, error)
         real(wp), intent(in) :: begin, weight, difference, start, start_rest, last
         real(wp), intent(inout) :: x, rest, change, error
@@ -186,7 +186,7 @@ contains
 
     end subroutine kick_and_drift_few
 
-    !> x + change, and in rest what x then lacks (Kahan).
+    !> x + change; rest receives the rounding error of the sum (Kahan).
     pure subroutine add(x, rest, change)
         real(wp), intent(inout) :: x, rest
         real(wp), intent(in) :: change

@@ -1,4 +1,4 @@
-!> Sets of sequences for `extrapolate`, and how their stages share the lanes: see frb_extrapolation.
+!> Sets of sequences for `extrapolate`, and the lanes of their stages: see frb_extrapolation.
 !>
 !> | set | sequences | order | stages | lanes | for |
 !> |-----|-----------|-------|--------|-------|-----|
@@ -6,7 +6,7 @@
 !> | 2 | 1..6, 8 | 14 | 8 | 8; 2, 6; 3, 5; 1, 4 | the last digits: weights four times smaller |
 !> | 3 | 1..6 | 12 | 6 | 6; 1, 5; 2, 4; 3 | loose tolerances |
 !>
-!> Lanes with a stage to spare rest at first, so that sequences end at few stages.
+!> A lane with fewer stages is idle at first, so that most sequences end with the last stage.
 module frb_extrapolation_sets
     use frb_extrapolation_lanes, only: lanes
     use frb_kinds, only: wp
@@ -18,8 +18,8 @@ module frb_extrapolation_sets
 
     integer :: j, k
     integer, parameter :: most_stages = 9, sets = 3, stages(sets) = [9, 8, 6]
-    !> Number of substeps of the sequence that a lane is at in each stage, and which of them; 0: it rests, at
-    !> the start of the step or (which = 1) at its end.
+    !> Number of substeps of the sequence in each lane and stage, and the number of the present substep; 0:
+    !> the lane is idle, at the start of the step or (which = 1) at its end.
     integer, parameter :: number(lanes, most_stages, sets) = reshape([ &
         0, 2, 3, 4, 8, 2, 3, 4, 8, 7, 3, 4, 8, 7, 6, 4, 8, 7, 6, 5, &
         8, 7, 6, 5, 8, 7, 6, 5, 8, 7, 6, 5, 8, 7, 6, 5, 8, 2, 3, 0, &
@@ -34,8 +34,8 @@ module frb_extrapolation_sets
         7, 5, 4, 1, 8, 6, 5, 1, 0, 0, 0, 0, 1, 1, 1, 0, 2, 1, 2, 0, &
         3, 2, 1, 0, 4, 3, 2, 1, 5, 4, 3, 2, 6, 5, 4, 3, 0, 0, 0, 0, &
         0, 0, 0, 0, 0, 0, 0, 0], [lanes, most_stages, sets])
-    !> Of a step of one: half of each drift, the kick before it, the time after it, and the last kick of a
-    !> sequence.
+    !> For a step of size one: half of each drift, the kick before it, the time after it, and the last kick of
+    !> a sequence.
     real(wp), parameter :: half(lanes, most_stages, sets) = merge(0.5_wp/max(number, 1), 0.0_wp, number > 0)
     real(wp), parameter :: kick(lanes, most_stages, sets) = half*merge(1, 2, which == 1)
     real(wp), parameter :: time_after(lanes, most_stages, sets) = real(which, wp)/max(number, 1)
@@ -50,7 +50,7 @@ module frb_extrapolation_sets
         .false., .true., .true., .true., .false., .false., .false., .false., .true., &
         .false., .true., .true., .false., .false., .true., .false., .true., .false., &
         .true., .true., .false., .false., .false., .true., .false., .false., .false.], [most_stages, sets])
-    !> Weights c_n = prod_(j /= n) n^2/(n^2 - j^2), and those less the weights without the coarsest sequence.
+    !> Weights c_n = prod_(j /= n) n^2/(n^2 - j^2), and c_n minus the weights without the coarsest sequence.
     real(wp), parameter :: weights(8, sets) = reshape( &
         [0.0_wp, 2.0_wp**12/(108864000.0_wp), 3.0_wp**12/(-33264000.0_wp), &
          4.0_wp**12/(23950080.0_wp), 5.0_wp**12/(-31135104.0_wp), 6.0_wp**12/(69189120.0_wp), &
@@ -64,7 +64,7 @@ module frb_extrapolation_sets
     integer, parameter :: squares(8) = [1, 4, 9, 16, 25, 36, 49, 64]
     real(wp), parameter :: differences(8, sets) = reshape( &
         [weights(:, 1)*4/squares, weights(:, 2)/squares, weights(:, 3)/squares], [8, sets])
-    !> The same for each lane and stage with which a sequence ends, else 0.
+    !> The weights for each lane and stage with which a sequence ends, else 0.
     real(wp), parameter :: last_weights(lanes, most_stages, sets) = reshape( &
         [((merge(weights(max(number(:, j, k), 1), k), 0.0_wp, ends(:, j, k)), j=1, most_stages), &
           k=1, sets)], [lanes, most_stages, sets])
@@ -72,7 +72,7 @@ module frb_extrapolation_sets
         [((merge(differences(max(number(:, j, k), 1), k), 0.0_wp, ends(:, j, k)), j=1, most_stages), &
           k=1, sets)], [lanes, most_stages, sets])
 
-    !> Attitudes at which the torque is asked for in a step, but for the start.
+    !> Number of attitudes in a step for which the torque is computed, without the start.
     integer, parameter :: torques_of_step(sets) = [35, 29, 21]
     !> The estimate of the error of a step h goes with this power of h.
     integer, parameter :: powers(sets) = [13, 13, 11]

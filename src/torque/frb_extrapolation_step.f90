@@ -20,21 +20,22 @@ module frb_extrapolation_step
     !> Error of a step by rounding, relative: seen in the estimate at half a radian a step.
     real(wp), parameter :: rounding = 5.0e-15_wp
 
-    !> A body on its way: its state in principal axes, what that lacks, and a step that is tried.
+    !> A body in a run: its state in principal axes, the rounding error of the state, and a step that is
+    !> tried.
     type :: extrapolated_body
         type(body_core) :: core
         logical :: other_axes = .false.                 !! the axes of m, q and torque are not principal
         logical :: compensated = .true.
         integer :: set = 1                              !! of sequences
-        real(wp) :: norm = 1.0_wp                       !! square of the norm of q, which is kept
+        real(wp) :: norm = 1.0_wp                       !! square of the norm of q, a constant
         real(wp) :: x(7) = 0.0_wp                       !! m and q
         real(wp) :: rest(7) = 0.0_wp
         real(wp) :: tau(3) = 0.0_wp                     !! torque at x
         logical :: torque_known = .false.
         real(wp) :: change(7) = 0.0_wp                  !! of x in the step tried
         real(wp) :: error = 0.0_wp                      !! estimate of its error, relative
-        logical :: is_finite = .false.                  !! no NaN or Inf came up in it; else error is 1
-        logical :: is_free = .false.                    !! there was no torque in it: x + change is exact
+        logical :: is_finite = .false.                  !! the step has no NaN or Inf; else error is 1
+        logical :: is_free = .false.                    !! the step has no torque: x + change is exact
     end type extrapolated_body
 
 contains
@@ -79,9 +80,10 @@ contains
         asked = asked + 1
     end subroutine ask_torque
 
-    !> Tries a step of size h from time t: `change` and `error`. `exact` takes the free flow itself, for
-    !> drifts that the series of the lanes do not reach; `few` only the first terms of these. code: what the
-    !> torque said; it is asked to the end, as others may take part in it.
+    !> Tries a step of size h from time t: `change` and `error`. `exact` uses the free flow itself, for drifts
+    !> too long for the series of the lanes; `few` uses the first terms of the series only. code: the first
+    !> code of the torque that is not status_ok. All torques are computed even then: other processes may take
+    !> part in them.
     subroutine try_step(self, scene, t, h, exact, few, asked, code)
         type(extrapolated_body), intent(inout) :: self
         class(body_scene), intent(inout) :: scene
@@ -192,7 +194,7 @@ contains
             m(form%axis) = [state%m(l, 1), state%m(l, 2), form%sign3*state%m(l, 3)]
             m = m + h*kick(l)*state%tau(l, :)
             q = state%q(l, :)
-            ! What it refuses is not finite, and shows in the result.
+            ! A state that it refuses is not finite, and so is the result.
             code = status_ok
             call flow_state(core, 2*h*half(l), m, code, 1.0_wp, q)
             state%m(l, :) = m(form%axis)
@@ -202,7 +204,7 @@ contains
         end do
     end subroutine kick_and_drift_exactly
 
-    !> Takes the step tried. Without any torque in it that is the free flow.
+    !> Makes the tried step. A step without any torque is made by the free flow.
     subroutine accept_step(self, h, code)
         type(extrapolated_body), intent(inout) :: self
         real(wp), intent(in) :: h

@@ -1,4 +1,4 @@
-!> What codes that keep other variables convert: angular velocity and momentum, vectors of the body and of
+!> Conversions for codes with other variables: angular velocity and momentum, vectors of the body and of
 !> space, the quaternion momentum of NO_SQUISH. For one body and for arrays (3, n), (4, n).
 !>
 !> All are functions. Arrays whose sizes do not match, bodies that could not be made and quaternions whose
@@ -52,8 +52,8 @@ module frb_frames
         module procedure quat_momentum_many
     end interface quat_momentum
 
-    !> The way back, momentum_from_quat(q, p4), is the vector part of q* p4/2, for a unit quaternion q. What
-    !> p4 has along q, 0 in an exact run, is left out.
+    !> The inverse, momentum_from_quat(q, p4), is the vector part of q* p4/2, for a unit quaternion q. The
+    !> component of p4 along q, 0 in an exact run, is dropped.
     interface momentum_from_quat
         module procedure momentum_from_quat_one
         module procedure momentum_from_quat_many

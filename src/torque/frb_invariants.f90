@@ -1,4 +1,4 @@
-!> What a run ought to keep: energy, momentum in space, norms; and an observer that watches them.
+!> Conserved quantities: energy, momentum in space, norms; and an observer that monitors them.
 module frb_invariants
     use frb_free_flow, only: core_of, rigid_body
     use frb_kinds, only: wp
@@ -31,14 +31,14 @@ module frb_invariants
 
     !> Angular momentum in the space frame, Q m: spatial_momentum(m, q), of one body or summed over all. NaN
     !> for sizes that do not match or q not of norm one.
-    !> Under a torque its component along an axis is constant when turning the body about that axis in space
-    !> leaves the potential as it is: along `force` for a heavy top.
+    !> Under a torque its component along an axis is constant if a turn of the body about this axis in space
+    !> does not change the potential: along `force` for a heavy top.
     interface spatial_momentum
         module procedure spatial_momentum_of_body
         module procedure spatial_momentum_of_group
     end interface spatial_momentum
 
-    !> An observer that keeps the largest departures from the values at the start of the run.
+    !> An observer that stores the largest differences from the values at the start of the run.
     !> `axis` is the direction in space along which the momentum is conserved, if any.
     type, extends(body_observer) :: invariant_monitor
         type(rigid_body) :: body
@@ -177,7 +177,7 @@ contains
         end do
     end function spatial_momentum_of_group
 
-    !> Takes the values at the start as those to be kept, and keeps the largest departures from them.
+    !> Stores the values at the start, and the largest differences from them.
     subroutine monitor_body(self, step, t, m, q, stop)
         class(invariant_monitor), intent(inout) :: self
         integer(int64), intent(in) :: step

@@ -1,4 +1,4 @@
-!> Kicks of a splitting scheme that take the change of the torque along with it: m += b h tau + c h^3 g.
+!> Kicks of a splitting scheme with the change of the torque: m += b h tau + c h^3 g.
 !>
 !> L_A V = -tau . I^-1 m, so [B,[A,B]] is the function G = tau . n of the attitude, n = I^-1 tau: the kick is
 !> that of the potential V - (c/b) h^2 G. Its torque, and what the commutator gives for a torque without a
@@ -9,9 +9,9 @@
 !> all in the body frame. The term n x tau is the curvature of the rotation group: the formula known from
 !> flat space lacks it, and without it every such scheme falls back to order 2.
 !>
-!> Where the scene does not tell D_n tau it comes from displaced torques, q turned by e n to one side and the
-!> other with e = h^2/4, (tau(+) - tau(-))/(2 e): its error is of order h^4, so order 6 is kept. One torque,
-!> turned by d = 2 (c/b) h^2 n, as tau(q exp(d)) + d x tau in the place of tau + (c/b) h^2 g, keeps order 4.
+!> If the scene does not provide D_n tau, it comes from displaced torques, with q turned by e n and by -e n,
+!> e = h^2/4: (tau(+) - tau(-))/(2 e) has an error of order h^4, so order 6 is kept. One torque at q turned by
+!> d = 2 (c/b) h^2 n, tau(q exp(d)) + d x tau in the place of tau + (c/b) h^2 g, keeps order 4.
 !>
 !> Sources: M. Suzuki, Phys. Lett. A 201 (1995) 425, S. A. Chin, Phys. Lett. A 226 (1997) 344 for flat space.
 module frb_modified_kicks
@@ -42,8 +42,8 @@ contains
         end if
     end function angular_response
 
-    !> The attitude turned by about the vector v in the body: 2 atan(|v|/2) instead of |v|, an odd function of
-    !> v too, which needs no sine. A turn beyond all sense is left out.
+    !> The attitude turned about the vector v in the body by the angle 2 atan(|v|/2) instead of |v|: also an
+    !> odd function of v, without a sine. If v overflows, q does not turn.
     pure function turned(q, v) result(p)
         real(wp), intent(in) :: q(4), v(3)
         real(wp) :: p(4)

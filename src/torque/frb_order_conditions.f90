@@ -25,11 +25,11 @@ module frb_order_conditions
 
     public :: order_report, order_conditions, longest_word
 
-    !> Words up to this length are compared, so this is the highest order that can be told.
+    !> Words up to this length are compared, so this is the highest order that can be found.
     integer, parameter :: longest_word = 10
 
-    !> What the order conditions say about a scheme. A residual is the Euclidean norm of the difference from
-    !> exp(A + B) over a set of words.
+    !> Order and residuals of a scheme. A residual is the Euclidean norm of the difference from exp(A + B)
+    !> over a set of words.
     type :: order_report
         integer :: order = 0                !! for any A and B
         integer :: nystroem_order = 0       !! when [B,[B,[B,A]]] = 0
@@ -47,9 +47,9 @@ contains
 
     !> The order of the product of exp(drifts(1) A), exp(kicks(1) B + modified(1) C), exp(drifts(2) A) ...,
     !> or, unless `drift_first`, of exp(kicks(1) B + modified(1) C), exp(drifts(1) A) ...
-    !> A condition counts as met when its residual is at most `tolerance`; the default stands well above the
-    !> rounding of coefficients given to 14 digits and well below any condition missed. Order 0 when numbers
-    !> of coefficients do not match.
+    !> A condition counts as met when its residual is at most `tolerance`; the default is well above the
+    !> rounding of coefficients given to 14 digits and well below the residual of any condition that is not
+    !> met. Order 0 when numbers of coefficients do not match.
     pure function order_conditions(drifts, kicks, drift_first, tolerance, modified) result(report)
         real(wp), intent(in) :: drifts(:), kicks(:)     !! coefficients a and b in the order of use, finite
         logical, intent(in) :: drift_first              !! whether drifts(1) comes before kicks(1)
@@ -132,7 +132,7 @@ contains
 
     contains
 
-        !> The term's coefficient of a word; 0 for what is no word.
+        !> The term's coefficient of a word; 0 for a number that is no word.
         pure function at(shorter) result(value)
             integer, intent(in) :: shorter
             real(wp) :: value
@@ -141,7 +141,7 @@ contains
             if (shorter > 0) value = term(shorter)
         end function at
 
-        !> What C = 2 BAB - BBA - ABB at the end of a word gives it.
+        !> The contribution of C = 2 BAB - BBA - ABB at the end of a word to its coefficient.
         pure function from_modified(longer) result(value)
             integer, intent(in) :: longer
             real(wp) :: value
@@ -197,7 +197,7 @@ contains
                 end do
             end do
         end do
-        ! Twice, so that what is left is orthogonal to rounding.
+        ! Twice, so that the difference is orthogonal to rounding.
         do pass = 1, 2
             do j = 1, rank
                 along(j) = sum(relation*rest(words(:, j)))

@@ -13,9 +13,8 @@ module frb_scenes
     !> A body with a fixed point under a constant force at one of its points: V = force . Q centre.
     !> The paper's heavy top (section 4.3) has force = u0 and centre = e3.
     !>
-    !> In a type that extends this one, `torque_lanes`, `torque_change` and `torque_and_gradient` ask the
-    !> `torque` of that type, as it may be another one: they are then those of body_scene, unless the type
-    !> overrides them too.
+    !> In a type that extends this one, `torque_lanes`, `torque_change` and `torque_and_gradient` are those of
+    !> body_scene, which use the `torque` of that type, unless the type overrides them too.
     type, extends(body_scene) :: heavy_top
         real(wp) :: force(3) = [0.0_wp, 0.0_wp, 1.0_wp]     !! gradient of V, in space
         real(wp) :: centre(3) = [0.0_wp, 0.0_wp, 1.0_wp]    !! point it acts at, in the body
@@ -36,7 +35,7 @@ module frb_scenes
         procedure :: potential => plain_scene_potential    !! the user's, or NaN
     end type plain_scene
 
-    !> What the procedures of a `plain_scene` take.
+    !> The interfaces of the procedures of a `plain_scene`.
     abstract interface
         !> The torque at attitude q and time t, in the body frame.
         subroutine plain_torque(q, t, tau)
@@ -74,7 +73,7 @@ contains
         stat = status_ok
     end subroutine heavy_top_torque
 
-    !> The same in lanes.
+    !> The torque in lanes.
     subroutine heavy_top_torque_lanes(self, q, t, tau, stat)
         class(heavy_top), intent(inout) :: self
         real(wp), intent(in) :: q(lanes, 4), t(lanes)
@@ -98,7 +97,7 @@ contains
         end select
     end subroutine heavy_top_torque_lanes
 
-    !> As u changes by u x n: (u x n) x centre.
+    !> (u x n) x centre, because u changes by u x n.
     pure subroutine heavy_top_torque_change(self, q, t, n, change, stat)
         class(heavy_top), intent(inout) :: self
         real(wp), intent(in) :: q(4), t, n(3)
@@ -156,7 +155,7 @@ contains
         end select
     end subroutine heavy_top_torque_and_gradient
 
-    !> c = a x b, number by number: inlined, as a call would take as long as all the rest.
+    !> c = a x b, number by number: inlined, because a call would double the time of the torque.
     pure subroutine cross_product(a1, a2, a3, b1, b2, b3, c1, c2, c3)
         real(wp), intent(in) :: a1, a2, a3, b1, b2, b3
         real(wp), intent(out) :: c1, c2, c3

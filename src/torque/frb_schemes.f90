@@ -1,6 +1,6 @@
 !> Splitting schemes: symmetric compositions of the drift (the free body, coefficients a) and the kick (the
-!> torque, coefficients b, and c where the kick is modified), named ones and those a user makes from
-!> coefficients of their own.
+!> torque, coefficients b, and c where the kick is modified): named schemes, and schemes from a user's
+!> coefficients.
 !>
 !> `splitting_scheme('srkn14')` gives a named scheme, `splitting_scheme(a, b)` checks and takes a user's own.
 !> A palindrome is stored once, up to its centre.
@@ -23,9 +23,9 @@
 !>
 !> A modified kick is m += b h tau + c h^3 g with g = 2 (D_n tau + n x tau), n = I^-1 tau, D_n tau the change
 !> of the torque as the body turns about n: see frb_modified_kicks. Coefficients of fg6a, fg6b and fg8 were
-!> brought from 16 digits to 30 by Newton's method on the order conditions, the free ones kept.
+!> brought from 16 digits to 30 by Newton's method on the order conditions; free coefficients did not change.
 !>
-!> Which for what: see frb_splitting.
+!> frb_splitting says when to use which scheme.
 !>
 !> Sources: S. Blanes, P. C. Moan, J. Comput. Appl. Math. 142 (2002) 313; S. Blanes et al., Appl. Numer. Math.
 !> 68 (2013) 58; S. Blanes, F. Casas, A. Escorihuela-Tomas, arXiv 2202.01541; I. P. Omelyan, I. M. Mryglod,
@@ -60,15 +60,15 @@ module frb_schemes
         real(wp) :: half_a(most_stages/2) = 0.0_wp  !! drift coefficients up to the centre
         real(wp) :: half_b(most_stages/2) = 0.0_wp  !! kick coefficients up to the centre
         real(wp) :: half_c(most_stages/2) = 0.0_wp  !! those of modified kicks, 0 for a plain kick
-        integer :: displaced = 2                    !! torques by which a modified kick tells the change of
-                                                    !! the torque, 1 or 2, when the scene does not
+        integer :: displaced = 2                    !! number of displaced torques of a modified kick, 1 or 2,
+                                                    !! if the scene does not provide the change of the torque
     contains
         procedure :: drift_coefficients    !! all of one step, in turn
         procedure :: kick_coefficients    !! all of one step, in turn
         procedure :: modified_coefficients    !! those of modified kicks
         procedure :: has_modified_kicks    !! whether there are any
         procedure :: stages    !! kicks of one step
-        procedure :: conditions    !! its order, and what it misses
+        procedure :: conditions    !! its order, and the residuals of its order conditions
     end type splitting_scheme
 
     !> A scheme by its name, `splitting_scheme(name)`, or from coefficients of the user's.
@@ -194,13 +194,13 @@ contains
     !> A scheme from all coefficients of one step, in the order of use: one more drift than kicks (ABA) or one
     !> more kick than drifts (BAB). `mirrored` writes out a palindrome given up to its centre.
     !> `status_bad_scheme` unless the coefficients are at most 1e6 in size, symmetric to 1e-14 of the largest
-    !> (or of one) and sum to one within `tolerance`, with at most `most_stages` drifts and kicks. What order
-    !> they have, `conditions` tells.
+    !> (or of one) and sum to one within `tolerance`, with at most `most_stages` drifts and kicks. Their order
+    !> is in the report of `conditions`.
     !>
     !> With c the kicks are modified: as many as b, symmetric to 1e-14, at most 1e6; their sum is free.
-    !> `displaced`: torques by which the change of the torque is told when the scene has no `torque_change`;
-    !> 2, the default, keep order 6, 1 keeps order 4 and costs less, but is refused where b is 0 and c is not.
-    !> Any other: `status_bad_option`.
+    !> `displaced`: number of displaced torques that give the change of the torque if the scene has no
+    !> `torque_change`; 2, the default, keep order 6; 1 keeps order 4 and costs less, but is refused where b
+    !> is 0 and c is not. Any other number: `status_bad_option`.
     pure function scheme_from_coefficients(a, b, name, tolerance, c, displaced) result(scheme)
         real(wp), intent(in) :: a(:)                    !! drifts
         real(wp), intent(in) :: b(:)                    !! kicks
@@ -233,7 +233,7 @@ contains
         call set_displaced(scheme, displaced)
     end function scheme_from_coefficients
 
-    !> How many displaced torques: a value that is none of the two spoils the scheme.
+    !> Sets the number of displaced torques: any number but 1 and 2 gives `status_bad_option`.
     pure subroutine set_displaced(scheme, displaced)
         type(splitting_scheme), intent(inout) :: scheme
         integer, intent(in), optional :: displaced
@@ -327,9 +327,9 @@ contains
         count = min(self%drifts, self%kicks)
     end function stages
 
-    !> What the order conditions say about the scheme: its order, its order under the Nystroem condition (the
-    !> one that counts for a body under torque), its orders for a small torque, and the residuals. A condition
-    !> counts as met within `tolerance`, 1e-12 by default. Takes a few milliseconds.
+    !> The order of the scheme, its order under the Nystroem condition (which a body under torque fulfils),
+    !> its orders for a small torque, and the residuals of the order conditions. A condition counts as met
+    !> within `tolerance`, 1e-12 by default. Takes a few milliseconds.
     pure function conditions(self, tolerance) result(report)
         class(splitting_scheme), intent(in) :: self
         real(wp), intent(in), optional :: tolerance

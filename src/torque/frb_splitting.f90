@@ -1,17 +1,17 @@
 !> Bodies under torque: the free flow (drift) and the torque (kick) in turns, H = T + V.
 !>
 !> One step of an ABA scheme is drift(a1 h) kick(b1 h) drift(a2 h) ... drift(a1 h), section 4.3 and the
-!> appendix of the paper; time passes with the drift. `splitting_plan` lays a step out, for `integrate` and
-!> for loops of the user's own.
+!> appendix of the paper; time passes with the drift. `splitting_plan` lists the drifts and kicks of a step,
+!> for `integrate` and for a user's own loops.
 !>
-!> Which for what:
+!> When to use which method:
 !>
-!> | wanted | take |
+!> | wanted | use |
 !> |--------|------|
 !> | a state at a time, to an accuracy, up to some 10 000 turns | `extrapolate` (frb_extrapolation) |
 !> | long runs and many bodies, symplectic and reversible | `fg6a` or `srkn14`, from 1e-9 on `fg8` |
 !> | the same with a small torque, |V| much smaller than T | `fg6b` |
-!> | where a torque is dear and the scene does not tell its change | `srkn14`; `aba864`, `aba1064` if small |
+!> | costly torques, and a scene without `torque_change` | `srkn14`; for a small torque `aba864`, `aba1064` |
 !> | last digits, very long runs | the same, `compensated` |
 !> | low accuracy, molecular dynamics with smooth forces | `srkn6`, `fg4`; with kinked forces `strang` |
 !>
@@ -46,25 +46,25 @@ module frb_splitting
     !> and t untouched: a body or scheme that could not be made (their own code); h zero, h or t not finite,
     !> or nsteps*h beyond 1e301 (`status_bad_time`); nsteps < 0, every < 1 or sizes that differ
     !> (`status_bad_count`); m not finite (`status_bad_momentum`); q not finite or its norm more than 1e-6 off
-    !> one (`status_bad_attitude`). q is handed to the torque as it is, so its norm should be one to the
-    !> accuracy wanted; it is kept. What ends a run later leaves m, q and t of the last whole step: the code
-    !> that a torque or drift returns; a torque that is not finite, or so large that m overflows
+    !> one (`status_bad_attitude`). The torque receives q with this norm, which the run keeps: it should be
+    !> one to the accuracy wanted. A run that ends early leaves m, q and t of the last whole step. It ends by
+    !> the code that a torque or drift returns; a torque that is not finite, or so large that m overflows
     !> (`status_bad_torque`); an observer (`status_stopped`; without `stat` the call then returns, while every
-    !> other code stops the program). All of these are agreed upon first where many processes share a scene:
-    !> see `agree` in frb_torque.
+    !> other code stops the program). Where many processes share a scene, they agree upon the code first: see
+    !> `agree` in frb_torque.
     !>
-    !> Exact restart: the state after a step depends on nothing but m, q, t and h before it. A run that is
-    !> stopped, by its observer or its number of steps, and continued from m, q and t as they came back, ends
-    !> with the same bits as one that is not; watching a run changes nothing either. A compensated run needs
-    !> `rests` as well: (7), or (7, n) for a group, what m (1:3) and q (4:7) lack; zero at the start, kept up
-    !> to date. For that, steps are whole: a scheme that opens and closes with a drift (ABA) makes both, one
-    !> more than it needs in a chain of steps. `joined` makes the two between steps as one where no state is
-    !> shown: then the bits depend on which states are. It pays where torques are cheap.
+    !> Exact restart: the state after a step depends on m, q, t and h before it only. A run that is stopped,
+    !> by its observer or its number of steps, and continued from the returned m, q and t, ends with the same
+    !> bits as a run in one call; observers do not change a run. A compensated run needs `rests` as well: (7),
+    !> or (7, n) for a group, the rounding errors of m (1:3) and q (4:7), zero at the start. For exact
+    !> restarts all steps are whole: a scheme that opens and closes with a drift (ABA) makes both drifts, one
+    !> more than a chain of steps needs. `joined` makes the two drifts between steps as one where no state is
+    !> shown: then the bits depend on which states are shown. It pays where torques are cheap.
     !>
     !> `compensated` carries the rounding error of every update of m and q over to the next one, and keeps |m|
     !> and the energy in every drift. It takes twice the time and pays in long runs: there energy,
-    !> momentum and norm stay within a few units of the last digit, where a plain run wanders by the square
-    !> root of the number of steps.
+    !> momentum and norm stay within a few units of the last digit, where errors of a plain run grow with the
+    !> square root of the number of steps.
     !>
     !> Accuracy: energy, 0.21, of the paper's heavy top within 1e-13 over 1e5 steps of 0.5; checked by
     !> `splitting: energy-of-the-papers-top-stays-within-1e-13`; compensated, of the Hairer-Vilmart top within
@@ -75,12 +75,11 @@ module frb_splitting
     !> a plain run up to h = 0.001 and 0.01; checked by `splitting: ...-there-and-back-return-the-start` and
     !> `splitting: ...-papers-long-run-there-and-back-returns-the-start`. A small change of the start grows in
     !> proportion to the time, 0.2 t on the paper's top, 0.8 t and 2 t on the other two, and rounding errors
-    !> grow with it. Without torque it is errors of |m| and of the energy that grow; these are taken back
-    !> after each drift, the energy only if the drift keeps it to rounding. Under a torque as strong as on
-    !> the Hairer-Vilmart tops the last digits of the turn of each
-    !> drift and of the torque count as well: with h = 0.1, T = 1000 the distance is 1e-13 to 2.5e-12 on the
-    !> asymmetric one and 2e-13 to 4e-12 on the flat one, plain 2e-12 to 1e-10. The chart program's `torque`
-    !> makes the table.
+    !> grow with it. Without torque only errors of |m| and of the energy grow; they are corrected after each
+    !> drift, the energy only if the drift keeps it to rounding. Under a torque as strong as on the
+    !> Hairer-Vilmart tops the last digits of the torque and of the turn in each drift count as well: with h =
+    !> 0.1, T = 1000 the distance is 1e-13 to 2.5e-12 on the asymmetric one and 2e-13 to 4e-12 on the flat
+    !> one, plain 2e-12 to 1e-10. The chart program's `torque` makes the table.
     interface integrate
         procedure integrate_body
         procedure integrate_alike

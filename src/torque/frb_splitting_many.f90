@@ -19,8 +19,8 @@ module frb_splitting_many
 
     public :: integrate_group
 
-    !> Momenta (3, n) and attitudes (4, n), what they lack and room for the turns in a compensated run, and
-    !> all of it at the last whole step.
+    !> Momenta (3, n) and attitudes (4, n), in a compensated run with their rounding errors and the turns of a
+    !> drift, and the state at the last whole step.
     type :: moving
         type(run_basis) :: basis
         real(wp), allocatable :: m(:, :), q(:, :), tau(:, :)
@@ -51,7 +51,7 @@ contains
         real(wp), intent(inout), optional :: t                      !! time, goes on by nsteps*h; from 0
         class(body_drift), intent(in), optional, target :: drift    !! default: the free flow, in a batch
         logical, intent(in), optional :: compensated                !! default: .false.
-        real(wp), intent(inout), optional :: rests(:, :)    !! (7, n): what m and q lack; from 0
+        real(wp), intent(inout), optional :: rests(:, :)    !! (7, n): rounding errors of m and q; from 0
         logical, intent(in), optional :: joined                     !! default: .false.
         integer, intent(out), optional :: stat                      !! status code
         type(splitting_plan) :: plan
@@ -99,7 +99,7 @@ contains
                 rests(4:7, :) = run%q_rest
             end if
         end if
-        ! An observer that stops a run has done what it was there for.
+        ! A stop by an observer is no error.
         if (code == status_stopped .and. .not. present(stat)) return
         call conclude(code, 'integrate', stat)
     end subroutine integrate_group
@@ -178,7 +178,7 @@ contains
             call turn_all(run, 1.0_wp)
             call run%scene%torques(run%q_turned, time, run%other, code)
         else if (run%basis%displaced == 2) then
-            ! Both, whatever the first one says: others may take part in the torques.
+            ! Both calls are made, whatever the first code is: other processes may take part in the torques.
             call turn_all(run, run%basis%reach)
             call run%scene%torques(run%q_turned, time, run%g, code)
             call turn_all(run, -run%basis%reach)

@@ -19,7 +19,8 @@ module frb_splitting_one
 
     public :: integrate_body
 
-    !> Momentum and attitude, what they lack in a compensated run, and all of it at the last whole step.
+    !> Momentum and attitude, in a compensated run with their rounding errors, and the state at the last whole
+    !> step.
     type :: moving
         type(run_basis) :: basis
         real(wp) :: m(3) = 0.0_wp
@@ -54,7 +55,7 @@ contains
         real(wp), intent(inout), optional :: t                      !! time, goes on by nsteps*h; from 0
         class(body_drift), intent(in), optional, target :: drift    !! default: the free flow
         logical, intent(in), optional :: compensated                !! default: .false.
-        real(wp), intent(inout), optional :: rests(7)               !! what m and q lack, compensated; from 0
+        real(wp), intent(inout), optional :: rests(7)               !! rounding errors of m and q; from 0
         logical, intent(in), optional :: joined                     !! default: .false.
         integer, intent(out), optional :: stat                      !! status code
         type(splitting_plan) :: plan
@@ -90,7 +91,7 @@ contains
             if (present(t)) t = time
             if (present(rests) .and. run%basis%compensated) rests = [run%m_rest, run%q_rest]
         end if
-        ! An observer that stops a run has done what it was there for.
+        ! A stop by an observer is no error.
         if (code == status_stopped .and. .not. present(stat)) return
         call conclude(code, 'integrate', stat)
     end subroutine integrate_body
@@ -118,7 +119,7 @@ contains
             call kick_state(amount, run%tau, run%m, run%m_rest)
             if (abs(modified) > 0.0_wp) call kick_state(modified, run%g, run%m, run%m_rest)
         else
-            ! One by one: a processor waits when it loads together what has been stored apart.
+            ! One by one: to load numbers in one vector that were stored one by one, a processor waits.
             run%m(1) = run%m(1) + amount*run%tau(1)
             run%m(2) = run%m(2) + amount*run%tau(2)
             run%m(3) = run%m(3) + amount*run%tau(3)
@@ -131,9 +132,9 @@ contains
     end subroutine kick
 
     !> The torque, and the torque g of a modified kick, from the scene's own change of the torque or from
-    !> displaced torques, for which a second agreement is needed. All torques are asked for, whatever `code`
-    !> said before: others may take part in them. One displaced torque takes the place of the torque itself,
-    !> and g is then 0.
+    !> displaced torques, for which a second agreement is needed. All torques are computed, whatever the code
+    !> before: other processes may take part in them. One displaced torque replaces the torque itself, and g
+    !> is then 0.
     subroutine ask_torque_and_gradient(run, time, kick, modified, code)
         type(moving), intent(inout) :: run
         real(wp), intent(in) :: time, kick, modified

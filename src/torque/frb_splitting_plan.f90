@@ -1,5 +1,5 @@
-!> What one step of a splitting scheme is made of, for `integrate` and for loops of the user's own; and the
-!> checks every call of `integrate` has in common.
+!> The drifts, kicks and times of one step of a splitting scheme, for `integrate` and for a user's own loops;
+!> and the checks common to all calls of `integrate`.
 module frb_splitting_plan
     use frb_kinds, only: wp
     use frb_schemes, only: splitting_scheme
@@ -14,8 +14,8 @@ module frb_splitting_plan
     !> h times coefficients, and start and end of a run: beyond it they could overflow.
     real(wp), parameter :: longest = 1.0e-7_wp*huge(1.0_wp)     ! coefficients are at most 1e6
 
-    !> One step of size h of a scheme: `splitting_plan(scheme, h)`. This loop is the whole recipe, for every
-    !> scheme, with whatever else moves, here centres of mass x with momenta p:
+    !> One step of size h of a scheme: `splitting_plan(scheme, h)`. This loop makes the step, for every
+    !> scheme, here with centres of mass x and momenta p:
     !>
     !>     do i = 1, plan%stages
     !>         call free_flow(body, plan%drift(i), m, q);  x = x + plan%drift(i)*p/mass
@@ -25,35 +25,35 @@ module frb_splitting_plan
     !>     call free_flow(body, plan%drift(i), m, q);  x = x + plan%drift(i)*p/mass     ! i is stages + 1
     !>     t = t + h
     !>
-    !> `integrate` takes these steps, to the last bit. A scheme that opens and closes with kicks (BAB) has a
-    !> zero drift at both ends. Then nothing has moved since the last torque of the step before, and it can be
-    !> kept, with `known = .false.` before the first step:
+    !> `integrate` makes the same steps, to the last bit. A scheme that opens and closes with kicks (BAB) has
+    !> a zero drift at both ends. Then the last torque of the step before is still valid and can be kept, with
+    !> `known = .false.` before the first step:
     !>
     !>     if (abs(plan%drift(i)) > 0 .or. .not. known) call my_forces(x, q, t + plan%time(i), f, tau)
     !>     known = .true.
     !>
     !> A scheme with modified kicks adds plan%modified(i)*g to m, g = 2 (D_n tau + n x tau) as in
-    !> frb_modified_kicks, and 2 D_n f to p; where anything else moves, D_n is the change with q turning by
-    !> n = I^-1 tau and x moving by f/mass together.
+    !> frb_modified_kicks, and 2 D_n f to p. With moving centres D_n is the change while q turns by n = I^-1
+    !> tau and x moves by f/mass.
     type :: splitting_plan
         integer :: status = status_bad_scheme   !! `status_ok`, or why there is no plan; then no stages
         integer :: stages = 0                   !! kicks in a step
         real(wp), allocatable :: drift(:)       !! (stages + 1): time of each drift
-        real(wp), allocatable :: kick(:)        !! (stages): what each torque is multiplied by
+        real(wp), allocatable :: kick(:)        !! (stages): factor of each torque
         real(wp), allocatable :: time(:)        !! (stages): of each torque, from the start of the step
         real(wp), allocatable :: modified(:)    !! (stages): c h^3 of modified kicks, else 0
     end type splitting_plan
 
-    !> What a run is told, and limits that follow from it.
+    !> Options of a run, and limits that follow from them.
     type :: run_basis
         logical :: compensated = .false.
         logical :: joined = .false.             !! two drifts between steps are one where nothing is shown
-        logical :: torque_known = .false.       !! nothing has moved since the last torque
+        logical :: torque_known = .false.       !! no attitude has changed since the last torque
         real(wp) :: largest_torque = 0.0_wp     !! of a torque whose kicks do not overflow
         real(wp) :: largest_gradient = 0.0_wp   !! the same of g, see frb_modified_kicks
         real(wp) :: reach = 0.0_wp              !! displaced torques: turn by this times n
-        integer :: displaced = 0                !! how many of them; 0: the scene tells the change
-        integer :: on_request = 2               !! how many if it does not
+        integer :: displaced = 0                !! number of displaced torques; 0: the scene has the change
+        integer :: on_request = 2               !! number of displaced torques if the scene has no change
     end type run_basis
 
     !> The plan of a step: `plan = splitting_plan(scheme, h [, stat])`.
@@ -119,13 +119,13 @@ contains
     end function is_step
 
     !> The time one step after t: t + (n + 1) h - n h rounded, n the steps from zero to t. It depends on t and
-    !> h alone, so that a run goes on from t as it would have gone on without a stop; and the rounding errors
-    !> of n h take each other back, so that it stays within a few units of the last digit of start + steps*h.
+    !> h alone, so a continued run has the times of a run in one call. The rounding errors of n h cancel, so
+    !> the time stays within a few units of the last digit of start + steps*h.
     pure function next_time(t, h) result(next)
         real(wp), intent(in) :: t, h
         real(wp) :: next
         real(wp), parameter :: resolved = 2.0_wp**(-52)
-        ! Between whole numbers, where t/h is seldom: n goes up by one in each step.
+        ! A fraction that t/h seldom has: n then grows by one in each step.
         real(wp), parameter :: between = 0.38_wp
         real(wp) :: n
 
@@ -154,7 +154,7 @@ contains
         basis%on_request = scheme%displaced
     end function new_basis
 
-    !> What is common to every call: first thing that is wrong, and defaults.
+    !> The checks common to all calls, and defaults: `code` is that of the first error.
     pure subroutine check_run(body_status, scheme, h, nsteps, spacing, start, code, every, t)
         integer, intent(in) :: body_status
         type(splitting_scheme), intent(in) :: scheme

@@ -1,4 +1,4 @@
-!> A run of a splitting scheme with its derivative: the loop of `splitting_plan` carries variations as well.
+!> A run of a splitting scheme with its derivative: the loop of `splitting_plan` advances variations too.
 module frb_splitting_tangent
     use frb_free_flow, only: flow_tangent, rigid_body
     use frb_kinds, only: wp
@@ -19,14 +19,14 @@ contains
 
     !> Integrates one body over nsteps steps of size h, in place, with the derivative of the run by its start,
     !> on (dm, dtheta) as in `flow_tangent`. A kick adds plan%kick (d tau/d theta) dtheta to dm, by the
-    !> scene's `torque_change` along the three axes of the body; that of `heavy_top` is there.
+    !> scene's `torque_change` along the three axes of the body; `heavy_top` has one.
     !>
-    !> q must have norm one, to 1e-6. For long runs call it again and again and keep what of the variations is
-    !> wanted.
-    !> Refused with `stat`, state and t untouched, the derivative 1: what `integrate` refuses at the start,
-    !> with its codes; what `flow_tangent` and the scene refuse later; a torque or its change that is not
-    !> finite (`status_bad_torque`); a scene without `torque_change` and a scheme with modified kicks
-    !> (`status_not_offered`).
+    !> q must have norm one, to 1e-6. For long runs call it for one part after another and multiply the
+    !> derivatives, or advance single variations.
+    !> Refused with `stat`, state and t untouched, the derivative 1: input that `integrate` refuses at the
+    !> start, with its codes; a state that `flow_tangent` or the scene refuses later; a torque or its change
+    !> that is not finite (`status_bad_torque`); a scene without `torque_change` and a scheme with modified
+    !> kicks (`status_not_offered`).
     subroutine integrate_tangent(body, scheme, scene, h, nsteps, m, q, transition, t, stat)
         type(rigid_body), intent(in) :: body
         type(splitting_scheme), intent(in) :: scheme

@@ -137,7 +137,7 @@ contains
         call conclude(code, 'langevin_kick', stat)
     end subroutine kick_bodies_axes
 
-    !> The first thing that is wrong.
+    !> `status_ok`, or the code of the first error.
     pure function first_fault(bodies, friction, temperature, dt, noise, m) result(code)
         integer, intent(in) :: bodies
         real(wp), intent(in) :: friction(3), temperature, dt, noise(:, :), m(:, :)

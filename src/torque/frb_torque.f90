@@ -1,9 +1,9 @@
-!> What a user fills in to put torque on a body: the scene (the torque), the observer (who watches a run) and
-!> the drift (who moves the free body, when it is not to be the free flow). All three are extensible types, so
-!> that parameters travel in components and nothing is global.
+!> Types that a user extends to put torque on a body: the scene (gives the torque), the observer (watches a
+!> run) and the drift (moves the free body in the place of the free flow). Parameters are components of these
+!> types, so nothing is global.
 !>
-!> Scenes and observers may count, keep lists and buffers, talk to other processes: `self` is intent(inout)
-!> and nothing has to be pure; a pure procedure may take the place of one that need not be.
+!> Scenes and observers may count, keep lists and buffers, communicate with other processes: `self` is
+!> intent(inout) and no procedure has to be pure; pure procedures are allowed too.
 !>
 !> Torque and momentum are in the body frame: m' = m x I^-1 m + tau(q, t), q' = q (0, I^-1 m)/2. A torque from
 !> a potential V(q) is tau = sum over body vectors u = Q^T u0 that V depends on of u x dV/du.
@@ -20,7 +20,7 @@ module frb_torque
     public :: body_scene, group_scene, body_observer, group_observer, body_drift, scene_lanes, &
         torque_lane_by_lane, one_after_the_other
 
-    integer, parameter :: scene_lanes = 8     !! attitudes at a time that `torque_lanes` is asked for
+    integer, parameter :: scene_lanes = 8     !! number of attitudes in one call of `torque_lanes`
 
     !> The torque on one body. Extend it with the scene's parameters, give `torque`, and give `potential` too
     !> where there is one and the energy is to be watched.
@@ -34,8 +34,8 @@ module frb_torque
         procedure :: agree => body_alone    !! hook of runs on many processes
     end type body_scene
 
-    !> The torques on n bodies that interact: each sees the attitudes of all. Centres are the scene's own
-    !> matter: components where they stand still, functions of t where they move.
+    !> The torques on n bodies that interact: each torque depends on all attitudes. The scene itself has the
+    !> centres of the bodies: as components if they are fixed, as functions of t if they move.
     type, abstract :: group_scene
     contains
         procedure(torques_on_group), deferred :: torques    !! the torques
@@ -62,7 +62,7 @@ module frb_torque
         procedure(advance_body), deferred :: advance    !! moves the body
     end type body_drift
 
-    !> What the procedures of a scene, an observer and a drift take.
+    !> The interfaces of the procedures of a scene, an observer and a drift.
     abstract interface
         !> The torque at attitude q and time t.
         subroutine torque_on_body(self, q, t, tau, stat)
@@ -126,8 +126,8 @@ module frb_torque
 contains
 
     !> The torques at several attitudes and times, for `extrapolate`: a scene that computes them in a loop
-    !> over the lanes, which the compiler turns into vectors, saves what single calls cost. By default these;
-    !> lanes 5 to 8 are not asked for where they are 1 to 4 again.
+    !> over the lanes, which the compiler turns into vectors, is faster than single calls. The default makes
+    !> single calls; lanes 5 to 8 that repeat lanes 1 to 4 need no calls.
     subroutine torque_lane_by_lane(self, q, t, tau, stat)
         class(body_scene), intent(inout) :: self
         real(wp), intent(in) :: q(scene_lanes, 4)         !! attitudes: a column for each component
@@ -152,7 +152,7 @@ contains
         if (last == half) tau(half + 1:, :) = tau(:half, :)
     end subroutine torque_lane_by_lane
 
-    !> Whether lanes 5 to 8 are 1 to 4 again, to the bit, NaN too.
+    !> Whether lanes 5 to 8 repeat lanes 1 to 4 to the bit, NaN included.
     pure function second_half_repeats(q, t) result(repeats)
         real(wp), intent(in) :: q(scene_lanes, 4), t(scene_lanes)
         logical :: repeats
@@ -178,9 +178,9 @@ contains
         bits = ieor(transfer(x, 0_int64), transfer(y, 0_int64))
     end function difference
 
-    !> How the torque changes as the body turns: change = d/de tau(q exp(e n), t) at e = 0, body frame, for
+    !> The change of the torque as the body turns: change = d/de tau(q exp(e n), t) at e = 0, body frame, for
     !> schemes with a modified kick (frb_modified_kicks); stat, `status_ok` or a code that ends the run. By
-    !> default `status_not_offered`: the schemes then take displaced torques.
+    !> default `status_not_offered`: the schemes then use displaced torques.
     subroutine body_change_unknown(self, q, t, n, change, stat)
         class(body_scene), intent(inout) :: self
         real(wp), intent(in) :: q(4), t
@@ -196,7 +196,7 @@ contains
 
     !> The torque and g = 2 (D_n tau + n x tau), n = I^-1 tau, of a modified kick (frb_modified_kicks) for a
     !> scene that shares work between them; response is I^-1 in the body frame. By default from `torque` and
-    !> `torque_change`. stat: `status_not_offered` where there is no `torque_change`; tau is there then.
+    !> `torque_change`. stat: `status_not_offered` where there is no `torque_change`; tau is set then too.
     subroutine one_after_the_other(self, q, t, response, tau, g, stat)
         class(body_scene), intent(inout) :: self
         real(wp), intent(in) :: q(4), t, response(3, 3)
@@ -257,10 +257,11 @@ contains
 
     !> The hook of runs on many processes. `integrate` calls it wherever it may have to end the run: once at
     !> the start, after each torque, after a drift that closes a step, after each drift of the user's and
-    !> after each observer, with the code of this process, mostly `status_ok`; what comes back, it acts on. A
+    !> after each observer, with the code of this process, mostly `status_ok`; the returned code decides. A
     !> scene that shares its torques among processes overrides it with the largest code of all (MPI_Allreduce
-    !> with MPI_MAX), so that they end together, whichever of them refuses. Codes of its own are then best
-    !> positive; scheme, step, numbers of steps, observer and drift must be alike on all. By default nothing.
+    !> with MPI_MAX): then all processes end together, whichever of them refuses. Its own codes should then be
+    !> positive; scheme, step, numbers of steps, observer and drift must be the same on all processes. The
+    !> default does nothing.
     subroutine body_alone(self, code)
         class(body_scene), intent(inout) :: self
         integer, intent(inout) :: code
