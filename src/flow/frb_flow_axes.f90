@@ -13,9 +13,10 @@ module frb_flow_axes
 
 contains
 
-    !> A step of a body whose own axes are not principal, and for a linear rotor, whose constants are those
-    !> of a sphere and hold in any axes. Otherwise the momentum is taken to principal axes, and only
-    !> the increments are taken back, so that no rounding of the rotation gathers over many steps.
+    !> A step of a body whose own axes are not principal, or of a linear rotor. A linear rotor has the
+    !> constants of a sphere, which hold in any axes. For other bodies the momentum is rotated to principal
+    !> axes, and only increments are rotated back, so that rounding of the rotation does not add up over many
+    !> steps.
     pure subroutine flow_in_principal_axes(body, h, m, code, q)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: h
@@ -45,8 +46,8 @@ contains
             if (code == status_ok) m = upright
             return
         end if
-        ! The change of m, not rounded to the digits of m: where axes are all but aligned, what they mix in
-        ! would be rounded away in every step, and |m| would drift.
+        ! The change of m, not rounded to the digits of m: with nearly principal axes the small part that the
+        ! rotation adds would be rounded away in every step, and |m| would drift.
         change = matmul(m, body%axes)
         if (present(q)) then
             turn = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
@@ -58,8 +59,8 @@ contains
         end if
     end subroutine flow_in_principal_axes
 
-    !> Adds a change of the momentum and a turn of norm one, both in principal axes, to m and q in those of
-    !> the body: as increments, so that rounding does not gather in what stays as it is.
+    !> Adds a change of the momentum and a turn of norm one, both in principal axes, to m and q in body axes:
+    !> as increments, so that rounding errors are those of the increments.
     pure subroutine turn_back(body, change, turn, m, q)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: change(3)

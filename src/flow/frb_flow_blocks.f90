@@ -1,5 +1,5 @@
-!> Blocks of bodies for frb_flow_lanes: constants of equal or different bodies, and the way of vectors from
-!> body axes to cyclic ones, the middle moment second, and back.
+!> Blocks of bodies for frb_flow_lanes: constants of equal or different bodies, and vectors in body axes taken
+!> to cyclic axes, the middle moment second, and back.
 module frb_flow_blocks
     use frb_flow_lanes, only: lanes, vector, lane_bodies, workspace, step_cyclic
     use frb_flow_lanes_long, only: step_long
@@ -15,11 +15,11 @@ module frb_flow_blocks
 
     integer, parameter :: same_axes = 1, shifted_axes = 2, turned_axes = 3
 
-    !> A block of bodies: its lanes from body axes to cyclic ones and back, and their constants.
+    !> A block of bodies: the relation of body axes to cyclic axes in each lane, and the constants.
     type :: block_of_bodies
         type(lane_bodies) :: of
-        real(wp) :: lane(lanes)             !! see body_core; 0: the lane is not stepped here
-        logical :: all_plain                !! all lanes are
+        real(wp) :: lane(lanes)             !! see body_core; 0: the lane does not move here
+        logical :: all_plain                !! all lanes have plain numbers
         integer :: axes_are                 !! same_axes, shifted_axes, turned_axes
         integer :: column(3)                !! place of each body axis in the columns of the momenta
         real(wp) :: axes(lanes, 3, 3)       !! turned: (:, i, k), component along body axis i of cyclic axis k
@@ -27,7 +27,7 @@ module frb_flow_blocks
 
 contains
 
-    !> `count` lanes filled to whole vectors: no loop has a rest.
+    !> `count` lanes rounded up to whole vectors: no loop ends with a part of a vector.
     pure function whole(count) result(full)
         integer, intent(in) :: count
         integer :: full
@@ -82,8 +82,8 @@ contains
         end do
     end subroutine set_bodies
 
-    !> Constants of bodies as columns, of `count` from the first or of the only one; the last is repeated to
-    !> `given`.
+    !> Constants as columns, of `count` bodies from number `first` on or of the only body; the last one is
+    !> repeated up to lane `given`.
     pure subroutine gather(body, bodies, first, count, given, block)
         integer, intent(in) :: bodies, first, count, given
         type(body_core), intent(in) :: body(:)
@@ -104,7 +104,7 @@ contains
         if (block%of%alike) block%of%rho = polynomial_of_rho(body(1)%a)
     end subroutine gather
 
-    !> The constants of the first lane in all others.
+    !> Copies the constants of the first lane to all others.
     pure subroutine fill(full, block)
         integer, intent(in) :: full
         type(block_of_bodies), intent(inout) :: block
@@ -239,7 +239,7 @@ contains
         end do
     end subroutine to_cyclic
 
-    !> And back.
+    !> Vectors of n lanes from cyclic axes to body axes.
     pure subroutine from_cyclic(n, block, v)
         integer, intent(in) :: n
         type(block_of_bodies), intent(in) :: block

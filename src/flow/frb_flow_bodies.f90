@@ -1,5 +1,5 @@
-!> Many free bodies at once: blocks of them through SIMD lanes, blocks through threads. States are columns
-!> there: those of rows are copied, those in columns are advanced where they are if they fill whole vectors.
+!> Many free bodies at once: the bodies of a block share SIMD lanes, blocks are shared among threads. Blocks
+!> have states as columns: states in rows are copied; states in columns that fill whole vectors move in place.
 module frb_flow_bodies
     use frb_flow_blocks, only: block_of_bodies, set_bodies, step_lanes, whole
     use frb_flow_lanes, only: lanes, workspace
@@ -64,7 +64,7 @@ contains
         code = refused
     end subroutine flow_many
 
-    !> The same with states in columns, q0 to q3 all or none: the same bits.
+    !> flow_many for states in columns, q0 to q3 all or none, with the same bits.
     subroutine flow_columns(body, bodies, h, times, n, m1, m2, m3, code, q0, q1, q2, q3)
         integer, intent(in) :: bodies, times, n     !! bodies and times: 1 or n
         type(body_core), intent(in) :: body(:)
@@ -180,7 +180,8 @@ contains
         end do
     end subroutine flow_rows
 
-    !> One block, its states in columns with room for whole vectors. What lanes cannot do goes by flow_body.
+    !> One block, its states in columns with room for whole vectors. Bodies that the lanes cannot move are
+    !> moved by flow_body.
     subroutine flow_block(body, bodies, h, times, first, count, block, with_attitude, x, y, refused)
         integer, intent(in) :: bodies, times, first, count
         type(body_core), intent(in) :: body(:)
@@ -243,7 +244,7 @@ contains
 
     end subroutine flow_block
 
-    !> Those of a block that are not done, one after another.
+    !> The bodies of a block that are not `done`, one after another.
     subroutine flow_rest(body, bodies, h, times, first, count, done, with_attitude, x, y, refused)
         integer, intent(in) :: bodies, times, first, count
         type(body_core), intent(in) :: body(:)
@@ -336,7 +337,7 @@ contains
         one = merge(1_int64, 0_int64, total < 0.25_wp*plain_largest)
     end function plain_momentum
 
-    !> The same and not all of them near zero.
+    !> 1 if the components are finite, far from overflow and not all near zero, else 0.
     pure function plain_attitude(q0, q1, q2, q3) result(one)
         real(wp), intent(in) :: q0, q1, q2, q3
         integer(int64) :: one

@@ -1,21 +1,22 @@
 !> One step of a block of bodies, one per SIMD lane, in a form that needs no sine, quadrant or period. With
 !> t = h/2, s, c, d the elliptic triple at t and a, b, g, p, r as in short_formulas.inc:
 !>
-!> L = s m(t), the momentum at mid-step, comes by the addition theorem. The same from there, forth and back,
-!> gives m(h) - m(0) = f (-a L2 L3, b L3 L1, -g L1 L2) and m(0) + m(h) = f L, f = 2 c d/(s D),
+!> L = s m(t), the momentum at mid-step, comes by the addition theorem. The theorem from there, forward and
+!> back, gives m(h) - m(0) = f (-a L2 L3, b L3 L1, -g L1 L2) and m(0) + m(h) = f L, f = 2 c d/(s D),
 !> D = 1 - a g L2^2. The turn q(0)^-1 q(h), (1, Y)/sqrt(1 + |Y|^2), carries m(h) to m(0): so
-!> Y x (m(0) + m(h)) = m(0) - m(h), and Y_i = (a_i t + rho) L_i. What is left, rho, is the angle about m, so
-!> a constant of the motion; from e z of frb_flow_one, at a phase where z is simple, with H the integral
-!> of the third kind, R = g m2^2 + b m3^2, nu = g R, tau = tan(|m| (a1 t - b nu H))/|m|:
+!> Y x (m(0) + m(h)) = m(0) - m(h), and Y_i = (a_i t + rho) L_i. The last unknown, rho, belongs to the angle
+!> about m, so it is a constant of the motion; it follows from e z of frb_flow_one, at a phase where z is
+!> simple, with H the integral of the third kind, R = g m2^2 + b m3^2, nu = g R, tau = tan(|m| (a1 t - b nu
+!> H))/|m|:
 !>     a1 t + rho = tau (1 + nu s^2) c/(s (d + tau s c R))
 !> or, axes 1 and 3 and c and d exchanged, with R = -(a m2^2 + b m1^2), nu = -a R and
 !> tau = tan(|m| (a3 t + b nu H))/|m|.
 !> The loops keep (X0, V), the turn up to its norm, V = X0 Y: so no division waits for another.
 !>
-!> For the shortest steps of equal bodies all is in series. rho is symmetric in a1, a2, a3, so a polynomial in
+!> The shortest steps of equal bodies use series only. rho is symmetric in a1, a2, a3, so a polynomial in
 !> u = (a t |m|)^2 and e = a t (a1 t m1^2 + a2 t m2^2 + a3 t m3^2), a the largest of them:
 !> rho/(a t) = (s2 e - 2 s3 u)/3 + ..., s1, s2, s3 the symmetric functions of a1/a, a2/a, a3/a: no form, no
-!> angle, no root. For different bodies forming the coefficients would take more than is gained.
+!> angle, no root. For different bodies it would take longer to form the coefficients than the series save.
 !>
 !> The loops are short, so that a processor has several vectors in work; each formula is called once in this
 !> module: GCC inlines only such private copies (a formula of another module took 2 to 4 times longer).
@@ -29,7 +30,7 @@ module frb_flow_lanes
     public :: lanes, vector, lane_bodies, workspace, step_cyclic, is_served
 
     integer, parameter :: lanes = 64    !! bodies in a block
-    integer, parameter :: vector = 8    !! blocks are filled to whole vectors: no loop has a rest
+    integer, parameter :: vector = 8    !! blocks are filled to whole vectors: no loop ends with a part
 
     !> How far a step reaches: max(p, r) and, in the same unit, the square of the half angle.
     real(wp), parameter :: angle_as_reach = 0.16_wp
@@ -46,10 +47,10 @@ module frb_flow_lanes
         real(wp) :: rate(lanes), base(lanes)            !! the larger and the smaller of them
         real(wp) :: above(lanes, 3)                     !! a1 t, a2 t, a3 t less base
         real(wp) :: rho(14)                             !! of equal bodies: polynomial_of_rho
-        logical :: alike                                !! they are equal: that polynomial holds
+        logical :: alike                                !! the bodies are equal: the polynomial holds
     end type lane_bodies
 
-    !> What the loops hand to one another.
+    !> Numbers that one loop computes and another one uses.
     type :: workspace
         real(wp) :: p(lanes), r(lanes), reach(lanes)
         real(wp) :: y(lanes), part(lanes)                           !! s^2; part of t where its series begins
@@ -88,7 +89,7 @@ contains
         call step_mixed(n, with_attitude, of, x1, x2, x3, work)
     end subroutine step_cyclic
 
-    !> Constants of the motion, and how many lanes reach no further than each class.
+    !> Constants of the motion, and the number of lanes whose reach is within each class.
     pure subroutine measure(n, of, x1, x2, x3, work, many)
         integer, intent(in) :: n
         type(lane_bodies), intent(in) :: of
@@ -122,7 +123,7 @@ contains
         many = [tiny, short, middle]
     end subroutine measure
 
-    !> Lanes of several classes: each class with the others at rest.
+    !> Lanes of several classes: one class after another, while the other lanes stand still.
     pure subroutine step_mixed(n, with_attitude, of, x1, x2, x3, work)
         integer, intent(in) :: n
         logical, intent(in) :: with_attitude
@@ -223,7 +224,7 @@ contains
         end if
     end subroutine step_class
 
-    !> Increments of the momentum. `keep`: with what the turn needs, or without.
+    !> Increments of the momentum. `keep`: also stores the numbers that the turn needs.
     pure subroutine move(n, of, x1, x2, x3, work)
         logical, parameter :: keep = .false.
         include 'lane_momentum.inc'

@@ -1,5 +1,5 @@
-!> The lanes of a block whose step is beyond frb_flow_lanes: the formulas of frb_flow_long in lanes, by
-!> doubling the triple, up to some ten periods. One by one they take 2 to 3 times longer.
+!> The lanes of a block whose step is too long for frb_flow_lanes: the formulas of frb_flow_long in lanes, by
+!> doubling the triple, up to about ten periods. One body after another would take 2 to 3 times longer.
 module frb_flow_lanes_long
     use frb_flow_lanes, only: lanes, lane_bodies, workspace, is_served
     use frb_flow_limits, only: middle_limit, square_limit, period_limit, smallest_denominator
@@ -31,7 +31,7 @@ contains
         near = reach <= period_limit
     end function is_near
 
-    !> As step_cyclic, for the lanes that it has left; what the others have got stays.
+    !> As step_cyclic, for the lanes that step_cyclic has not moved; the results of the other lanes stay.
     pure subroutine step_long(n, with_attitude, of, x1, x2, x3, work, all_near)
         integer, intent(in) :: n
         logical, intent(in) :: with_attitude
@@ -70,7 +70,7 @@ contains
         if (with_attitude) call turn_lanes(n, of, at, work)
     end subroutine step_long
 
-    !> How often the time of each lane must be halved for max(p, r) part^2 to come down to `limit`.
+    !> The number of halvings of the time that bring max(p, r) part^2 down to `limit` in each lane.
     pure subroutine count_halvings(n, limit, p, r, part, halvings)
         integer, intent(in) :: n
         real(wp), intent(in) :: limit, p(lanes), r(lanes)
@@ -198,7 +198,7 @@ contains
         end do
     end subroutine double_angles
 
-    !> Numerators over a denominator that has become small, and with them the angle, of order one again.
+    !> Divides by a denominator that has become small: numerators and angle are then of order one again.
     pure subroutine form_anew(n, with_attitude, at)
         integer, intent(in) :: n
         logical, intent(in) :: with_attitude

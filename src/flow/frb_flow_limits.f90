@@ -1,4 +1,4 @@
-!> Where each formula of the free flow takes over, shared by the routines for one body and for many.
+!> The limits between the formulas of the free flow, shared by the routines for one body and for many.
 !> P, R: the squares of the two frequencies, nu: the parameter of the third kind; t: the half step or a part.
 module frb_flow_limits
     use frb_kinds, only: wp
@@ -12,14 +12,14 @@ module frb_flow_limits
     !> A bound for NaN, where a compiler assumes that there is none: 10 are needed after settled times.
     integer, parameter :: most_halvings = 16
     real(wp), parameter :: short_limit = 0.002_wp       !! largest max(P, R) (h/2)^2 of the short series
-    real(wp), parameter :: tiny_limit = 1.0e-4_wp       !! the same of the first terms alone
+    real(wp), parameter :: tiny_limit = 1.0e-4_wp       !! largest max(P, R) (h/2)^2 of its first terms alone
     real(wp), parameter :: tiny_turn_limit = 1.0e-3_wp  !! largest square of a half angle of the first terms
     real(wp), parameter :: small_turn_limit = 0.04_wp   !! largest square of a half angle of the short series
     real(wp), parameter :: middle_limit = 0.03_wp       !! largest max(P, R) t^2 of the middle series
     real(wp), parameter :: middle_turn_limit = 0.6_wp   !! largest square of a half angle of the middle series
     real(wp), parameter :: square_limit = 0.8_wp        !! largest max(P, R) t^2 to which s^2 alone is doubled
     real(wp), parameter :: period_limit = 1024.0_wp     !! max(P, R) (h/2)^2 from which periods are taken out
-    real(wp), parameter :: smallest_denominator = 1.0e-9_wp    !! of the triple before it is formed anew
+    real(wp), parameter :: smallest_denominator = 1.0e-9_wp    !! of the triple, before a division
     real(wp), parameter :: sin_cos_limit = 1.5e6_wp     !! largest argument of sin_cos
     real(wp), parameter :: plain_largest = 1.0e75_wp    !! components whose squares and products are safe
     real(wp), parameter :: plain_smallest = 1.0e-75_wp

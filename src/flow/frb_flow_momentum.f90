@@ -12,7 +12,7 @@ module frb_flow_momentum
 
     public :: flow_one
 
-    !> Which series a step takes.
+    !> The series that a step uses.
     integer, parameter :: tiny_step = 1, short_step = 2, middle_step = 3, beyond_series = 4
     logical, parameter :: with_attitude = .false.
 

@@ -1,4 +1,4 @@
-!> The period of the elliptic triple, by the arithmetic-geometric mean, for those who keep it.
+!> The period of the elliptic triple, by the arithmetic-geometric mean, for callers that store it.
 module frb_flow_periods
     use frb_kinds, only: wp, pi
     implicit none

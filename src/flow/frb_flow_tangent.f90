@@ -1,5 +1,5 @@
-!> The exact step with its exact derivative, `flow_tangent`: how a small change of the momentum, of the
-!> attitude and of the inertia goes through the free flow. For filters, fits, shooting, Lyapunov exponents.
+!> The exact step with its exact derivative, `flow_tangent`: the effect of a small change of the momentum, the
+!> attitude or the inertia on the state after the step. For filters, fits, shooting, Lyapunov exponents.
 !>
 !> Variations of the attitude are rotation vectors in body axes: q + dq = q (1, dtheta/2), the error state of
 !> multiplicative Kalman filters. After the step
@@ -14,13 +14,13 @@
 !> axes, the separatrix. Next to the unstable axis the derivative grows as exp(lambda h): entries beyond the
 !> largest number are Inf, none is NaN. Zero momentum: J = E = 1, W = h I^-1. Angles beyond 2^64 are cut, as
 !> in free_flow: the derivative is then that of the shorter time. A linear rotor has no momentum along its
-!> axis: derivatives by it are 0, and by the moments only the sum of the columns of the two equal ones has a
-!> meaning.
+!> axis: derivatives by this component are 0. Of its derivatives by the moments only the sum of the columns of
+!> the two equal moments has a meaning.
 !>
 !> Accuracy: J, W and the derivatives by the inertia within 4 units (medians within 0.5) of their own inherent
 !> sensitivity, on 325 cases of data/reference and as many others; held by the suite `tangent`.
 !>
-!> Method: closed form; the only integrals besides that of the step are those of s^2, s^2/c^2 and s^2/d^2.
+!> Method: closed form, with three integrals more than the step: those of s^2, s^2/c^2 and s^2/d^2.
 submodule(frb_free_flow) frb_flow_tangent
     use frb_flow_tangent_body, only: jacobian_body, tangent_body
     use frb_flow_tangent_many, only: tangent_many

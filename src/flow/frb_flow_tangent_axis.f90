@@ -1,5 +1,5 @@
-!> The derivative along the unstable axis: where a motion has settled on it, the group law adds the rest of
-!> the time in closed form, with hyperbolic functions that may overflow.
+!> The derivative along the unstable axis: when a motion has reached this axis to all digits, the group law
+!> adds the remaining time in closed form, with hyperbolic functions that may overflow.
 module frb_flow_tangent_axis
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
@@ -19,9 +19,9 @@ module frb_flow_tangent_axis
 
 contains
 
-    !> Goes on for the time tau from a state on the middle axis; m stays. By the group law Phi(h + tau) =
-    !> Phi(tau) Phi(h). Entries overflow to Inf where they are beyond the largest number, and are never NaN:
-    !> what grows and what does not are added last.
+    !> Continues for the time tau from a state on the middle axis; m stays. By the group law Phi(h + tau) =
+    !> Phi(tau) Phi(h). Entries beyond the largest number are Inf, never NaN: terms that grow and terms that
+    !> do not are added last.
     pure subroutine follow_axis(body, tau, m, elements, q, transition, jacobian, by_inertia)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: tau, m(3)

@@ -1,6 +1,6 @@
-!> The free flow of any body with its derivative: refusals, extreme exponents, axes of a tensor, and the
-!> motion that has settled on the unstable axis, around the steps of frb_flow_tangent_one and
-!> frb_flow_tangent_long.
+!> The free flow of any body with its derivative, by the steps of frb_flow_tangent_one and
+!> frb_flow_tangent_long: refusals, extreme exponents, axes of a tensor, and motions that have reached the
+!> unstable axis to all digits.
 module frb_flow_tangent_body
     use frb_flow_axes, only: turn_back
     use frb_flow_limits, only: plain_largest, plain_smallest
@@ -53,7 +53,7 @@ contains
 
     !> Advances m, and q when present, of any body by h, with `transition` and, if wanted, the derivatives by
     !> the inertia (6, 3) or (6, 6); without q, with `jacobian`. code says why the input was refused, if it
-    !> was: it is then left alone, and the derivatives are those of no step.
+    !> was: the state then stays, and the derivatives are those of no step.
     pure recursive subroutine tangent_body(body, h, m, code, elements, q, transition, jacobian, by_inertia)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: h
@@ -95,7 +95,7 @@ contains
         end if
     end subroutine tangent_body
 
-    !> Why numbers are refused.
+    !> `status_ok`, or why the numbers are refused.
     pure function refusal(h, m, q) result(code)
         real(wp), intent(in) :: h, m(3)
         real(wp), intent(in), optional :: q(4)
@@ -138,7 +138,7 @@ contains
         end if
     end subroutine no_step
 
-    !> W = h I^-1, that of a body at rest, into `transition`.
+    !> Writes W = h I^-1 of a body at rest into `transition`.
     pure subroutine turns_from_rest(body, h, transition)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: h
@@ -181,7 +181,8 @@ contains
         if (present(by_inertia)) call inertia_columns(body, parts, m, elements, by_inertia)
     end subroutine tangent_plain
 
-    !> The same beyond the series. A motion that settles on the middle axis goes on along this axis.
+    !> As tangent_plain, for steps too long for the series. A motion that reaches the middle axis to all
+    !> digits continues on this axis.
     pure subroutine tangent_beyond(body, h, m, elements, q, transition, jacobian, by_inertia)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: h
@@ -207,7 +208,7 @@ contains
                                                by_inertia)
     end subroutine tangent_beyond
 
-    !> Sorted axes are right-handed: an odd sorting turns the last one round.
+    !> Sorted axes are right-handed: after an odd sorting the last axis is reversed.
     pure subroutine reflect(axis, transition, jacobian)
         integer, intent(in) :: axis
         real(wp), intent(inout), optional :: transition(6, 6)
@@ -257,7 +258,8 @@ contains
         end if
         change = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
         call tangent_body(principal, h, n, code, elements, change, transition, by_inertia=by_inertia)
-        ! m is constant in space. n - old would lose what axes almost aligned mix in.
+        ! m is constant in space. With nearly principal axes n - old would lose the part that the rotation
+        ! adds.
         c = 2*cross(change(2:4), old)
         if (code == status_ok) call turn_back(body, cross(change(2:4), c) - change(1)*c, change, m, q)
         transition(1:3, 1:3) = in_axes(body%axes, transition(1:3, 1:3))
@@ -286,7 +288,7 @@ contains
         end do
     end function in_axes
 
-    !> Takes out of derivatives by the momentum what it has along an axis.
+    !> Removes the derivative by the component of the momentum along an axis.
     pure subroutine drop_axis(axis, derivatives)
         real(wp), intent(in) :: axis(3)
         real(wp), intent(inout) :: derivatives(:, :)

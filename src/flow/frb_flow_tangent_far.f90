@@ -1,7 +1,7 @@
 !> Longer steps of a block of bodies, one body per SIMD lane: the doublings of frb_flow_tangent_long, as many
-!> as each lane needs, up to the steps from which whole periods are taken out. A doubling reads one set of
-!> arrays and writes another: of a store that depends on its lane a compiler makes one that is slow. A body
-!> takes a third of the time that it takes alone (AVX2: 75 to 90 ns instead of 230 to 300).
+!> as each lane needs, for steps too short for whole periods to be removed. A doubling reads one set of arrays
+!> and writes another, because compilers make slow code of a store that depends on its lane. A body takes a
+!> third of the time that it takes alone (AVX2: 75 to 90 ns instead of 230 to 300).
 module frb_flow_tangent_far
     use frb_flow_limits, only: middle_limit, square_limit, sin_cos_limit
     use frb_flow_tangent_lanes, only: lanes, lane_orbits, lane_ends
@@ -14,12 +14,12 @@ module frb_flow_tangent_far
     !> Most doublings: 4^6 square_limit > period_limit, 4^3 middle_limit > square_limit.
     integer, parameter :: most_triples = 6, most_squares = 3
 
-    !> What the loops hand to one another.
+    !> Numbers that one loop computes and another one uses.
     type :: doubling_lanes
         real(wp) :: norm(lanes), delta(lanes), pmax(lanes), pmin(lanes)     !! |m|, |R - P|, larger, smaller
         real(wp) :: cn(lanes)                                       !! 1 or -1: c or d is cn-like
         real(wp) :: squares(lanes), triples(lanes), span(lanes)     !! doublings; square of the first time
-        real(wp) :: c(lanes)                                        !! that which belongs to p
+        real(wp) :: c(lanes)                                        !! the function of the triple for p
         real(wp) :: n2(lanes), n3(lanes)                            !! momentum at mid-step
         real(wp) :: cosine(lanes), sine(lanes), along(lanes)        !! of the turn e about m
     end type doubling_lanes
@@ -32,14 +32,14 @@ module frb_flow_tangent_far
 
 contains
 
-    !> Finds for the lanes of `of` what finish_lanes puts together; b: beta t of the body.
+    !> Computes the parts that finish_lanes combines, for the lanes of `of`; b: beta t of the body.
     pure subroutine find_far_ends(b, of, ends)
         real(wp), intent(in) :: b
         type(lane_orbits), intent(in) :: of
         type(lane_ends), intent(inout) :: ends
         type(doubling_lanes) :: it
         type(lane_triples) :: at(2)     ! a doubling reads one and writes the other
-        integer :: i, now               ! which one holds
+        integer :: i, now               ! number of the present one
 
         call count_halvings(b, of, it)
         call find_first_parts(b, of, it, at(1))
@@ -59,7 +59,7 @@ contains
         call find_covectors(b, of, it, at(now), ends)
     end subroutine find_far_ends
 
-    !> How many doublings each lane needs, and the square of the part of the time before them.
+    !> The number of doublings of each lane, and the square of the part of the time before them.
     pure subroutine count_halvings(b, of, it)
         real(wp), intent(in) :: b
         type(lane_orbits), intent(in) :: of

@@ -1,10 +1,11 @@
-!> Derivatives of a step by the inertia, from what frb_flow_tangent_one and frb_flow_tangent_long leave of it.
+!> Derivatives of a step by the inertia, from the parts that frb_flow_tangent_one and frb_flow_tangent_long
+!> store of the step.
 !>
 !> By alpha, beta, gamma as if they were independent, then a1: d_beta + d_gamma, a2: d_alpha - d_gamma, a3:
 !> -d_alpha - d_beta, and dI_k = -a_k^2 da_k. An element A_ij off the diagonal of the inverse tensor is a turn
 !> of the axes, which changes A_12 by gamma, A_13 by -beta, A_23 by alpha; the formulas are divided by these
-!> before they are evaluated, so that symmetric bodies are no case. Momentum follows from the attitude: dm' =
-!> m' x dtheta'.
+!> factors before they are evaluated, so symmetric bodies are no special case. The momentum follows from the
+!> attitude: dm' = m' x dtheta'.
 module frb_flow_tangent_inertia
     use frb_flow_tangent_parts, only: step_parts
     use frb_inertia, only: body_core
@@ -15,7 +16,7 @@ module frb_flow_tangent_inertia
 
     public :: inertia_columns, elements_in_axes
 
-    !> The derivatives of x and Y by any quantity share these.
+    !> Numbers that the derivatives of x and Y by any quantity share.
     type :: phase
         real(wp) :: x, yy, twice, over_d0, xg, yd, ye, dn, over_w, c2a, d2b, shift, sign
     end type phase
@@ -173,8 +174,8 @@ contains
                  f%e3*(psi - 2*f%a*shift) - ay]
     end function turn_of
 
-    !> Elements 11, 22, 33, 12, 13, 23 of axes^T M axes for M of one element, in the same order: what a change
-    !> of one element of a tensor is in the principal axes. Column k: of element k.
+    !> A change of one element of a tensor, seen in principal axes: column k has the elements 11, 22, 33, 12,
+    !> 13, 23 of axes^T M axes for the M with element k only, in the same order.
     pure function elements_in_axes(axes) result(change)
         real(wp), intent(in) :: axes(3, 3)
         real(wp) :: change(6, 6)

@@ -1,10 +1,10 @@
 !> Blocks of equal bodies with their derivatives, one body per SIMD lane, in loops of fixed length that the
-!> compiler vectorises. This module loads a block and puts states and derivatives together, from what
-!> frb_flow_tangent_near and frb_flow_tangent_far find of its steps. What happens to a body depends on itself
-!> alone, not on the others of its block. Each formula is called in one place: only then is it inlined.
+!> compiler vectorises. This module loads a block and combines states and derivatives from the parts that
+!> frb_flow_tangent_near and frb_flow_tangent_far compute. The result of a body does not depend on the others
+!> of its block. Each formula is called in one place: only then is it inlined.
 !>
-!> Components of the states are read and written where the caller keeps them, each as an array of its own with
-!> a constant distance between bodies. So a block may have its axes in any order.
+!> Components of the states are read and written in the caller's memory, each as an array with a constant
+!> distance between bodies. So a block may have its axes in any order.
 module frb_flow_tangent_lanes
     use frb_flow_limits, only: tiny_limit, short_limit, small_turn_limit, middle_limit, period_limit, &
         sin_cos_limit, plain_largest, plain_smallest
@@ -37,13 +37,13 @@ module frb_flow_tangent_lanes
         logical :: all_tiny, all_short                          !! all lanes, in the angle about m too
         real(wp) :: reach(lanes), square(lanes)                 !! largest of p, r; half angle^2
         real(wp) :: m(lanes, 3)                                 !! momentum in cyclic axes
-        real(wp) :: m1(lanes), m2(lanes), m3(lanes), gg(lanes)  !! the same in those of the form; |m|^2
+        real(wp) :: m1(lanes), m2(lanes), m3(lanes), gg(lanes)  !! momentum in axes of the form; |m|^2
         real(wp) :: p(lanes), r(lanes), nu(lanes)
         real(wp) :: side(lanes)                                 !! 1: first form, -1: its mirror image
         real(wp) :: a(lanes), g(lanes), rate(lanes)
     end type lane_orbits
 
-    !> What is known of the steps before their derivatives are put together: see tangent_formulas.inc.
+    !> The parts of the steps from which the derivatives are formed: see tangent_formulas.inc.
     type :: lane_ends
         real(wp) :: e1(lanes), e2(lanes), e3(lanes)                 !! momentum at the end
         real(wp) :: w0(lanes), w1(lanes), w2(lanes), w3(lanes)      !! turn e z, less 1
@@ -228,7 +228,7 @@ contains
         end do
     end subroutine join_lanes
 
-    !> Advances m and q, and puts the derivatives together; what lanes hold that are not served means nothing.
+    !> Advances m and q, and forms the derivatives; results of lanes that are not served have no meaning.
     pure subroutine finish_lanes(body, of, it, m, q, transition)
         type(lane_body), intent(in) :: body
         type(lane_orbits), intent(in) :: of

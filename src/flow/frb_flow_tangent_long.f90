@@ -13,9 +13,9 @@ module frb_flow_tangent_long
     public :: long_tangent
 
     real(wp), parameter :: separatrix = 1.0e-200_wp     !! |R - P|/max(P, R) that counts as 0
-    real(wp), parameter :: settled = 60.0_wp            !! half times 1/lambda to the axis
+    real(wp), parameter :: settled = 60.0_wp            !! half step that ends on the axis, times lambda
 
-    !> The doublings in progress. z: common denominator of the triple, kept apart between two doublings.
+    !> The state of the doublings. z: common denominator of the triple, by which no doubling divides.
     type :: doubling_state
         real(wp) :: pmax, pmin, delta
         real(wp) :: fraction, turned                        !! of the half step; sign of s and cn
@@ -29,8 +29,8 @@ module frb_flow_tangent_long
 contains
 
     !> Advances m, and q when present, by 2 t, and forms `transition`, or `jacobian` without q. m /= 0,
-    !> everything plain. On the separatrix (delta <= 1e-200 pmax), nothing is done when the motion settles on
-    !> the middle axis to all digits before that: `reached` < 1 is then the part of the time it takes.
+    !> all numbers plain. On the separatrix (delta <= 1e-200 pmax) the motion may reach the middle axis to all
+    !> digits before this time: then nothing is done, and `reached` < 1 is the part of the time until then.
     pure subroutine long_tangent(body, t, m, reached, parts, q, transition, jacobian)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: t
@@ -99,8 +99,8 @@ contains
         end if
     end subroutine long_tangent
 
-    !> The constants of the motion in the form with the smaller nu, and the part of the half step that is left
-    !> when whole periods are taken out.
+    !> The constants of the motion in the form with the smaller nu, and the part of the half step that remains
+    !> without whole periods.
     pure subroutine set_orbit(body, t, m, with_attitude, f, it)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: t, m(3)
@@ -184,7 +184,7 @@ contains
         end if
     end subroutine uniform_turn
 
-    !> All doublings, and the periods back in: triple in f, integrals in `it`.
+    !> All doublings, then the integrals over whole periods: triple in f, integrals in `it`.
     pure subroutine double_up(f, it, with_attitude)
         type(step_parts), intent(inout) :: f
         type(doubling_state), intent(inout) :: it

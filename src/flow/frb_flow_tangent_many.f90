@@ -1,5 +1,5 @@
-!> Many equal bodies with the derivatives of their step: blocks of them through SIMD lanes, blocks through
-!> threads.
+!> Many equal bodies with the derivatives of their step: the bodies of a block share SIMD lanes, blocks are
+!> shared among threads.
 module frb_flow_tangent_many
     use frb_flow_limits, only: plain_largest, middle_limit, period_limit
     use frb_flow_tangent_body, only: tangent_body
@@ -131,7 +131,8 @@ contains
         call finish_lanes(of, orbits, ends, m, q, transition)
     end subroutine step_lanes
 
-    !> The zeros of [J 0; W E], and of E what is written later: four numbers fill a vector.
+    !> Writes the zeros of [J 0; W E], and the first row of E, which is written later: four numbers fill a
+    !> vector.
     pure subroutine clear(transition)
         real(wp), intent(inout) :: transition(36, lanes)
         integer :: l, k
@@ -143,7 +144,7 @@ contains
         end do
     end subroutine clear
 
-    !> Whether angles that the body turns in the time h stay far from overflow.
+    !> Whether the angle that the body turns in the time h is far from overflow.
     pure function is_plain_time(body, h) result(plain)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: h

@@ -23,8 +23,8 @@ module frb_flow_tangent_momentum
 
 contains
 
-    !> Advances m by 2 t and forms `jacobian`. `done` is .false., and nothing is changed, when the series do
-    !> not reach so far. Everything plain.
+    !> Advances m by 2 t and forms `jacobian`. `done` is .false., and nothing is changed, when the step is too
+    !> long for the series. All numbers plain.
     pure subroutine short_jacobian(body, t, m, jacobian, done)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: t

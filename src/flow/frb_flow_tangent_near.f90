@@ -9,19 +9,19 @@ module frb_flow_tangent_near
 
     public :: find_near_ends
 
-    !> What the loops hand to one another.
+    !> Numbers that one loop computes and another one uses.
     type :: series_lanes
         real(wp) :: v0(lanes), v2(lanes), v3(lanes), size(lanes), change(lanes), twice(lanes)
         real(wp) :: over_w(lanes), over_gg(lanes)                   !! 1/(1 + nu s^2), 1/|m|^2
-        ! One array for each series, so that none is overwritten: of a store that depends on its lane a
-        ! compiler makes one that is slow.
+        ! One array for each series, so that none is overwritten: compilers make slow code of a store that
+        ! depends on its lane.
         real(wp), dimension(lanes, 3) :: y, scd, dd, aa, bb, third  !! s^2, s c d; D, A, B, H
         real(wp), dimension(lanes, 3) :: along, cosm1               !! e is (1 + cosm1, along m)
     end type series_lanes
 
 contains
 
-    !> Finds for the lanes of `of` what finish_lanes puts together; b: beta t of the body.
+    !> Computes the parts that finish_lanes combines, for the lanes of `of`; b: beta t of the body.
     pure subroutine find_near_ends(b, of, ends)
         real(wp), intent(in) :: b
         type(lane_orbits), intent(in) :: of
@@ -62,7 +62,8 @@ contains
         end do
     end subroutine tiny_parts
 
-    !> The same with all terms of short steps, for lanes that the first ones do not serve.
+    !> The triple and the integrals with all terms of short steps, for lanes that need more than the first
+    !> terms.
     pure subroutine short_parts(of, it)
         type(lane_orbits), intent(in) :: of
         type(series_lanes), intent(inout) :: it

@@ -11,13 +11,13 @@ module frb_flow_tangent_one
 
     public :: short_tangent
 
-    !> How far a step reaches: which series it takes.
+    !> The series that a step uses.
     integer, parameter :: tiny_step = 1, short_step = 2, middle_step = 3, long_step = 4
 
 contains
 
     !> Advances m and q by 2 t, and forms `transition`. `done` is .false., and nothing is changed, when the
-    !> series do not reach so far. m /= 0, everything plain.
+    !> step is too long for the series. m /= 0, all numbers plain.
     pure subroutine short_tangent(body, t, m, done, q, transition, parts)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: t
@@ -79,7 +79,8 @@ contains
         x3 = x3 + (m1*w2 - m2*w1)
     end subroutine add_moment
 
-    !> The constants of the motion, in the form with the smaller nu unless the series do not reach so far.
+    !> The constants of the motion, in the form with the smaller nu unless the step is too long for the
+    !> series.
     pure subroutine set_form(body, t, m, f, reach)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: t, m(3)
@@ -193,7 +194,7 @@ contains
         call small_turn_matrix(w0, w1, w2, w3, e11, e12, e13, e21, e22, e23, e31, e32, e33)
     end subroutine advance_attitude
 
-    !> What the derivatives by the inertia want besides.
+    !> Further numbers for the derivatives by the inertia.
     pure subroutine describe(f, parts)
         type(step_parts), intent(in) :: f
         type(step_parts), intent(out) :: parts

@@ -1,4 +1,4 @@
-!> What the stages of a step with its derivative hand to one another.
+!> The numbers that the stages of a step with its derivative share.
 module frb_flow_tangent_parts
     use frb_kinds, only: wp
     implicit none
@@ -10,7 +10,7 @@ module frb_flow_tangent_parts
     !> mirror form has the axes (3, 2, 1) and side = -1: a -> (-a3, -a2, -a1), turns change their sign.
     type :: step_parts
         integer :: o1, o2, o3       !! its axes in those of the body
-        real(wp) :: s1, s3    !! signs of axes 1 and 3: an odd sorting turns one round
+        real(wp) :: s1, s3    !! signs of axes 1 and 3: an odd sorting reverses one
         real(wp) :: side
         real(wp) :: t               !! half step
         real(wp) :: a, b, g          !! alpha t, beta t, gamma t

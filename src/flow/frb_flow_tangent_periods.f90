@@ -1,5 +1,5 @@
-!> Many periods in one step: what of the time is left, and the integrals of the step and of its derivative
-!> over what is taken out.
+!> Many periods in one step: the time that remains without whole periods, and the integrals of the step and of
+!> its derivative over the periods.
 module frb_flow_tangent_periods
     use frb_kinds, only: wp, pi
     implicit none
@@ -9,7 +9,7 @@ module frb_flow_tangent_periods
 
 contains
 
-    !> As in frb_flow_long, with the integrals D and `own` over what is taken out.
+    !> As in long_step.inc, with the integrals D and `own` over the periods that are removed.
     pure subroutine reduce_periods(pmax, delta, nu, with_third, fraction, turned, whole_third, whole_dd, &
                                    whole_own)
         real(wp), intent(in) :: pmax, delta, nu

@@ -1,21 +1,21 @@
 !> A rigid body, `rigid_body`, and its exact free flow, `free_flow`: momentum only, with a quaternion, with a
-!> matrix; for one body and for many. One formula for every orbit: no case is special, no input of finite
-!> numbers fails.
+!> matrix; for one body and for many. One formula holds for all orbits, without special cases; no input of
+!> finite numbers fails.
 !>
 !> State: m, angular momentum in the body; q or a, attitude, body to space. Any consistent units. Both are
-!> advanced in place by the time h, of any sign and size; steps that the series reach as m + increment and
-!> q + increment: N short steps gather rounding like a random walk, and the norms do not drift. A longer step
-!> multiplies q by a turn of norm one to rounding: where all turns are alike, an epsilon a step can add up,
-!> and for a body by its tensor also where they are not, in m too, as its axes are orthogonal to rounding. A
-!> quaternion keeps the norm it comes with, a matrix its defect of orthogonality, to that.
+!> advanced in place by the time h, of any sign and size. Short steps, by series, add increments to m and q:
+!> rounding errors of N steps grow like a random walk, and the norms do not drift. A longer step multiplies q
+!> by a turn of norm one to rounding: if all steps are equal, rounding can add up by at most one epsilon per
+!> step; for a body by its tensor also with unequal steps, and in m too, because its axes are orthogonal to
+!> rounding only. Within these errors a quaternion keeps its norm, and a matrix its defect of orthogonality.
 !>
 !> Errors (`stat`): the status of a body that could not be made; `status_bad_momentum`, `status_bad_time`,
 !> `status_bad_attitude` for NaN, Inf and a quaternion of norm zero; `status_bad_count` for arrays that do not
-!> match. Refused state is left as it is. Zero momentum, h = 0 and n = 0 are the identity. With `stat` present
-!> the calls for one body are pure: they can stand in pure procedures and in `do concurrent`.
+!> match. A refused state does not change. Zero momentum, h = 0 and n = 0 are the identity. With `stat`
+!> present the calls for one body are pure: they can stand in pure procedures and in `do concurrent`.
 !>
-!> Linear rotors: the momentum along the axis of the zero moment must be 0. Up to 1e-8 of the momentum it is
-!> taken for rounding and removed; more is refused with `status_bad_momentum`.
+!> Linear rotors: the momentum along the axis of the zero moment must be 0. Up to 1e-8 of the momentum counts
+!> as rounding and is removed; more is refused with `status_bad_momentum`.
 !>
 !> Accuracy: m and attitude within 2 units (medians within 0.5) of the inherent sensitivity, on the 325 cases
 !> of data/reference and as many of another seed; largest seen 1.6. Held by the suite `free-flow`.
@@ -88,7 +88,7 @@ module frb_free_flow
     !>     call flow_tangent(body, h, m, q, transition, by_moments [, stat])
     !>     call flow_tangent(body, h, m, q, transition, by_tensor=by_tensor [, stat=stat])
     !>
-    !> What they are, and how accurate: see frb_flow_tangent.
+    !> frb_flow_tangent defines these derivatives and states their accuracy.
     interface flow_tangent
         !> The momentum alone: no attitude cost.
         module subroutine tangent_of_momentum(body, h, m, jacobian, stat)

@@ -1,5 +1,5 @@
 !> More ways to call `free_flow` for many bodies, each with its own time h(n) or with matrices, and
-!> `free_flow_columns` for states that are columns. Status, accuracy and threads as for the other ways.
+!> `free_flow_columns` for states that are columns. Status, accuracy and threads as in frb_free_flow.
 module frb_free_flow_many
     use frb_flow_bodies, only: flow_many, flow_columns
     use frb_free_flow, only: rigid_body, core_of, cores_of, turn_matrix

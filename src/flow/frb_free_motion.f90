@@ -1,8 +1,9 @@
 !> One free motion at many times: `free_motion`, with its period and its precession, constants set up once.
 !>
-!> After one period T the momentum in the body is back and the attitude has turned about the momentum, fixed
-!> in space, by the angle of precession. So m and q at any time are those at a time within half a period of
-!> the start, turned n times; the error of the phase grows with the rounding of T and of the angle alone.
+!> After one period T the momentum in the body returns to its start, and the attitude has turned about the
+!> momentum, fixed in space, by the angle of precession. So m and q at any time are those at a time within
+!> half a period of the start, turned n times; the error of the phase grows with the rounding of T and of the
+!> angle only.
 module frb_free_motion
     use frb_flow_periods, only: quarter_period
     use frb_free_flow, only: flow_tangent, core_of, free_flow, rigid_body
@@ -18,7 +19,7 @@ module frb_free_motion
     public :: free_motion
 
     !> A free motion given by its body and its state at t = 0: `motion = free_motion(body, m, q)`.
-    !> `status` is not status_ok when the body, m or q was refused; `at` then hands it on.
+    !> `status` is not status_ok when the body, m or q was refused; `at` then returns it.
     type :: free_motion
         integer :: status = status_bad_momentum
         logical :: periodic = .false.       !! not on a separatrix or the middle axis, for a sphere, m = 0
@@ -258,7 +259,7 @@ contains
     !> axis) goes round in one period, whole turns counted [rad]; modulo 2 pi it is the turn of the body after
     !> a period. The axis of largest moment goes round 2 pi further. A body whose two lesser moments are equal
     !> has its symmetry axis in the place of the long one: the angle is then |m| T/I1. NaN without a period.
-    !> Accuracy: 4 epsilon, relative, where the motion itself does not hang on the last digits of the input;
+    !> Accuracy: 4 epsilon, relative, if the motion itself does not depend on the last digits of the input;
     !> checked by free-motion: precession-agrees-with-25-digits.
     pure function precession(self) result(angle)
         class(free_motion), intent(in) :: self
@@ -268,8 +269,8 @@ contains
         if (self%periodic) angle = whole_angle(self)
     end function precession
 
-    !> Mean time in which the axis of `precession` goes once round the momentum, 2 pi T/angle: what is
-    !> published as P_phi of a tumbling asteroid, beside `period`, its P_psi. Inf where there is no period.
+    !> Mean time in which the axis of `precession` goes once round the momentum, 2 pi T/angle: the published
+    !> P_phi of a tumbling asteroid, while `period` is its P_psi. Inf where there is no period.
     pure function precession_period(self) result(time)
         class(free_motion), intent(in) :: self
         real(wp) :: time
