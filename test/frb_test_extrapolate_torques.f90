@@ -51,6 +51,7 @@ contains
         call t%open_suite('extrapolate-torques', 51)
         call test_values(t)
         call test_torques(t)
+        call test_bad_torques(t)
         call test_axes(t)
         call t%close_suite()
     end subroutine test_extrapolate_torques
@@ -91,19 +92,17 @@ contains
         end do
     end subroutine test_values
 
-    !> Torques of time, switched on, NaN, refused, noise.
+    !> Torques that depend on time, that turn, or are switched on.
     subroutine test_torques(t)
         type(tally), intent(inout) :: t
         type(top_case) :: item
         type(pulsed_torque) :: pulse
-        type(spoilt_torque) :: spoilt
         type(switched_torque) :: switch
-        type(noisy_torque) :: noisy
         type(turning_top) :: turning
-        type(scalar_top) :: refusing, late
+        type(scalar_top) :: late
         type(rigid_body) :: body
         type(extrapolation_report) :: report
-        real(wp) :: m(3), q(4), m_ref(3), q_ref(4), time, angle, error(2), seen
+        real(wp) :: m(3), q(4), m_ref(3), q_ref(4), time, angle, error(2), order
         integer, parameter :: steps(2) = [8, 12]
         integer :: i, stat
 
@@ -131,8 +130,8 @@ contains
             call extrapolate(item%body, turning, 5.0_wp, m, q, 1.0e-9_wp, t=time, step=5.0_wp/steps(i))
             error(i) = distance(m, q, m_ref, q_ref)
         end do
-        seen = log(error(1)/error(2))/log(real(steps(2), wp)/steps(1))
-        call t%ok('order-is-kept-where-the-force-turns', seen > 12.0_wp)
+        order = log(error(1)/error(2))/log(real(steps(2), wp)/steps(1))
+        call t%ok('order-is-kept-where-the-force-turns', order > 12.0_wp)
 
         ! m3 = max(0, t - from), angle = m3^2/(2 I3).
         switch%from = 0.3717_wp
@@ -151,9 +150,24 @@ contains
         q = item%q0
         call extrapolate(item%body, late, 1.0e4_wp, m, q, 1.0e-9_wp, stat=stat)
         call t%equal('a-torque-that-begins-late-is-not-too-rough', stat, status_ok)
+    end subroutine test_torques
 
+    !> Torques that are NaN, refused, or noise.
+    subroutine test_bad_torques(t)
+        type(tally), intent(inout) :: t
+        type(top_case) :: item
+        type(spoilt_torque) :: spoilt
+        type(noisy_torque) :: noisy
+        type(scalar_top) :: refusing
+        type(rigid_body) :: body
+        real(wp) :: m(3), q(4), time
+        integer :: stat
+
+        body = rigid_body([1.0_wp, 1.5_wp, 2.0_wp])
+        item = known_top(2)
         spoilt%until = 0.7_wp
         m = [1.0_wp, 0.5_wp, 0.2_wp]
+        q = item%q0
         time = 0.0_wp
         call extrapolate(body, spoilt, 3.0_wp, m, q, 1.0e-9_wp, t=time, stat=stat)
         call t%equal('a-nan-torque-ends-the-run', stat, status_bad_torque)
@@ -169,12 +183,12 @@ contains
         call extrapolate(item%body, refusing, 3.0_wp, m, q, 1.0e-9_wp, t=time, stat=stat)
         call t%ok('a-torque-that-refuses-ends-the-run-with-its-code', stat == 77 .and. time <= 1.0_wp)
         m = [1.0_wp, 0.5_wp, 0.2_wp]
-        call extrapolate(body, noisy, 3.0_wp, m, q, 1.0e-12_wp, stat=stat, report=report)
+        call extrapolate(body, noisy, 3.0_wp, m, q, 1.0e-12_wp, stat=stat)
         call t%equal('a-torque-without-rhyme-or-reason-is-refused', stat, status_too_rough)
         m = [1.0_wp, 0.5_wp, 0.2_wp]
         call extrapolate(body, noisy, 3.0_wp, m, q, 0.1_wp, stat=stat)
         call t%ok('or-taken-at-a-loose-tolerance', stat == status_ok .or. stat == status_too_rough)
-    end subroutine test_torques
+    end subroutine test_bad_torques
 
     !> Bodies by tensor and linear rotors.
     subroutine test_axes(t)

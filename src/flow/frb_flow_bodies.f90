@@ -16,8 +16,9 @@ module frb_flow_bodies
 
     public :: flow_many, flow_columns
 
-    !> As many take no longer in a block than one after another. Fewer go by flow_body; from here on what
-    !> becomes of a body does not depend on the others: the same bits for any threads and parts of a batch.
+    !> From this number of bodies on a block is at least as fast as one body after another; fewer bodies go by
+    !> flow_body. In blocks the result of a body does not depend on the others: the same bits for any number
+    !> of threads and any parts of a batch.
     integer, parameter :: least = 7
     logical, parameter :: none(lanes) = .false.
 
