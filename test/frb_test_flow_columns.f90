@@ -113,7 +113,7 @@ contains
     subroutine check_columns(t, some)
         type(tally), intent(inout) :: t
         type(sample), intent(in) :: some
-        integer, parameter :: splits(4) = [n, 64, 24, 10]
+        integer, parameter :: splits(4) = [n, 64, 24, 7]
         character(*), parameter :: names(4) = [character(30) :: 'equal-bodies', 'equal-bodies-own-times', &
             'different-bodies', 'different-bodies-own-times']
         real(wp) :: m(3, n), q(4, n), alone(3, n), mc(3, n), qc(4, n)

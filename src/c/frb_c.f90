@@ -134,17 +134,18 @@ contains
             packed = all_usable(core)
         end if
         if (packed) then
-            call flow_many(core, bodies, [h], 1, int(n), m_of, code, q_of)
+            call flow_many(core, bodies, ldb == 0, [h], 1, int(n), m_of, code, q_of)
         else
             call c_f_pointer(body, words, [max(ldb, int(body_doubles, c_size_t)), int(bodies, c_size_t)])
-            call flow_strided(words, h, m_of, code, q_of)
+            call flow_strided(words, ldb == 0, h, m_of, code, q_of)
         end if
         stat = int(code, c_int)
     end function c_flow_many
 
     !> The flow of n bodies that are not packed, or were not made: bodies and states are copied in chunks.
-    subroutine flow_strided(words, h, m, code, q)
+    subroutine flow_strided(words, alike, h, m, code, q)
         real(c_double), intent(in), target :: words(:, :)   !! bodies: one, or as many as states
+        logical, intent(in) :: alike                        !! the first is meant for all
         real(c_double), intent(in) :: h
         real(c_double), intent(inout) :: m(:, :)            !! the first 3 rows
         integer, intent(out) :: code
@@ -170,10 +171,10 @@ contains
             part_m(:, :count) = m(:3, first:last)
             if (present(q)) then
                 part_q(:, :count) = q(:4, first:last)
-                call flow_many(part, bodies, [h], 1, count, part_m, code_here, part_q)
+                call flow_many(part, bodies, alike, [h], 1, count, part_m, code_here, part_q)
                 q(:4, first:last) = part_q(:, :count)
             else
-                call flow_many(part, bodies, [h], 1, count, part_m, code_here)
+                call flow_many(part, bodies, alike, [h], 1, count, part_m, code_here)
             end if
             m(:3, first:last) = part_m(:, :count)
             code = max(code, code_here)

@@ -100,7 +100,6 @@ contains
                 block%of%last(l) = one%a(3)
             end associate
         end do
-        block%of%alike = bodies == 1
         if (block%of%alike) block%of%rho = polynomial_of_rho(body(1)%a)
     end subroutine gather
 

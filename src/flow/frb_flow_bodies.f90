@@ -16,19 +16,18 @@ module frb_flow_bodies
 
     public :: flow_many, flow_columns
 
-    !> From this number of bodies on a block is at least as fast as one body after another; fewer bodies go by
-    !> flow_body. In blocks the result of a body does not depend on the others: the same bits for any number
-    !> of threads and any parts of a batch.
-    integer, parameter :: least = 7
     logical, parameter :: none(lanes) = .false.
 
 contains
 
     !> Many bodies in blocks, one per SIMD lane; body(:) holds one body for all or one for each, and so does
-    !> h(:). The blocks are independent: with -fopenmp they are shared among the threads.
-    subroutine flow_many(body, bodies, h, times, n, m, code, q)
+    !> h(:). The blocks are independent: with -fopenmp they are shared among the threads. What becomes of a body
+    !> does not depend on the others: the same bits for any threads and parts of a batch. (So one body takes a
+    !> block too, though a call for it alone is faster.)
+    subroutine flow_many(body, bodies, alike, h, times, n, m, code, q)
         integer, intent(in) :: bodies, times, n     !! bodies and times: 1 or n
         type(body_core), intent(in) :: body(:)
+        logical, intent(in) :: alike                !! body(1) is meant for all, whatever n
         real(wp), intent(in) :: h(times)
         real(wp), intent(inout) :: m(3, n)
         integer, intent(out) :: code
@@ -39,17 +38,7 @@ contains
         call check_many(body, bodies, h, times, code)
         if (code /= status_ok .or. n == 0) return
         refused = status_ok
-        if (n < least) then
-            do first = 1, n
-                if (present(q)) then
-                    call flow_single(body, bodies, h, times, first, m(1, first), refused, q(1, first))
-                else
-                    call flow_single(body, bodies, h, times, first, m(1, first), refused)
-                end if
-            end do
-            code = refused
-            return
-        end if
+        block%of%alike = alike
         if (max(bodies, times) == 1) call set_bodies(body, bodies, h, times, 1, min(n, lanes), block)
         !$omp parallel do if (n >= 64*lanes) firstprivate(block) private(count) reduction(max: refused)
         do first = 1, n, lanes
@@ -65,10 +54,11 @@ contains
         code = refused
     end subroutine flow_many
 
-    !> flow_many for states in columns, q0 to q3 all or none, with the same bits.
-    subroutine flow_columns(body, bodies, h, times, n, m1, m2, m3, code, q0, q1, q2, q3)
+    !> The same with states in columns, q0 to q3 all or none: the same bits.
+    subroutine flow_columns(body, bodies, alike, h, times, n, m1, m2, m3, code, q0, q1, q2, q3)
         integer, intent(in) :: bodies, times, n     !! bodies and times: 1 or n
         type(body_core), intent(in) :: body(:)
+        logical, intent(in) :: alike                !! body(1) is meant for all, whatever n
         real(wp), intent(in) :: h(times)
         real(wp), intent(inout) :: m1(n), m2(n), m3(n)
         integer, intent(out) :: code
@@ -82,6 +72,7 @@ contains
         call check_many(body, bodies, h, times, code)
         if (code /= status_ok .or. n == 0) return
         refused = status_ok
+        block%of%alike = alike
         if (max(bodies, times) == 1) call set_bodies(body, bodies, h, times, 1, min(n, lanes), block)
         !$omp parallel do if (n >= 64*lanes) firstprivate(block) private(last, count, served, x, y, work) &
         !$omp& reduction(max: refused)
@@ -90,7 +81,7 @@ contains
             count = last - first + 1
             if (max(bodies, times) > 1) call set_bodies(body, bodies, h, times, first, count, block)
             served = .false.
-            if (block%all_plain .and. n >= least .and. count == whole(count)) then
+            if (block%all_plain .and. count == whole(count)) then
                 if (present(q0)) then
                     call flow_whole(count, block, .false., work, served, m1(first), m2(first), m3(first), &
                                     q0(first), q1(first), q2(first), q3(first))
@@ -108,11 +99,7 @@ contains
                 y(:count, 3) = q2(first:last)
                 y(:count, 4) = q3(first:last)
             end if
-            if (n < least) then
-                call flow_rest(body, bodies, h, times, first, count, none, present(q0), x, y, refused)
-            else
-                call flow_block(body, bodies, h, times, first, count, block, present(q0), x, y, refused)
-            end if
+            call flow_block(body, bodies, h, times, first, count, block, present(q0), x, y, refused)
             m1(first:last) = x(:count, 1)
             m2(first:last) = x(:count, 2)
             m3(first:last) = x(:count, 3)

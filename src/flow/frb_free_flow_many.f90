@@ -44,7 +44,7 @@ contains
         real(wp), intent(inout), contiguous :: m(:, :)
         integer, intent(out), optional :: stat
 
-        call rows([core_of(body)], h, size(h), m, stat)
+        call rows([core_of(body)], .true., h, size(h), m, stat)
     end subroutine momenta_of_body_at_times
 
     !> The momenta of the n bodies body(n), by the times h(n).
@@ -54,7 +54,7 @@ contains
         real(wp), intent(inout), contiguous :: m(:, :)
         integer, intent(out), optional :: stat
 
-        call rows(cores_of(body), h, count_of(body, h), m, stat)
+        call rows(cores_of(body), .false., h, count_of(body, h), m, stat)
     end subroutine momenta_of_bodies_at_times
 
     !> The momenta and quaternions of n equal bodies, by the times h(n).
@@ -64,7 +64,7 @@ contains
         real(wp), intent(inout), contiguous :: m(:, :), q(:, :)
         integer, intent(out), optional :: stat
 
-        call rows([core_of(body)], h, size(h), m, stat, q)
+        call rows([core_of(body)], .true., h, size(h), m, stat, q)
     end subroutine quaternions_of_body_at_times
 
     !> The momenta and quaternions of the n bodies body(n), by the times h(n).
@@ -74,7 +74,7 @@ contains
         real(wp), intent(inout), contiguous :: m(:, :), q(:, :)
         integer, intent(out), optional :: stat
 
-        call rows(cores_of(body), h, count_of(body, h), m, stat, q)
+        call rows(cores_of(body), .false., h, count_of(body, h), m, stat, q)
     end subroutine quaternions_of_bodies_at_times
 
     !> The momenta and matrices of n equal bodies, by h.
@@ -84,7 +84,7 @@ contains
         real(wp), intent(inout), contiguous :: m(:, :), a(:, :, :)
         integer, intent(out), optional :: stat
 
-        call matrices([core_of(body)], [h], size(m, 2), m, a, stat)
+        call matrices([core_of(body)], .true., [h], size(m, 2), m, a, stat)
     end subroutine matrices_of_body_at_time
 
     !> The momenta and matrices of n equal bodies, by the times h(n).
@@ -94,7 +94,7 @@ contains
         real(wp), intent(inout), contiguous :: m(:, :), a(:, :, :)
         integer, intent(out), optional :: stat
 
-        call matrices([core_of(body)], h, size(h), m, a, stat)
+        call matrices([core_of(body)], .true., h, size(h), m, a, stat)
     end subroutine matrices_of_body_at_times
 
     !> The momenta and matrices of the n bodies body(n), by h.
@@ -104,7 +104,7 @@ contains
         real(wp), intent(inout), contiguous :: m(:, :), a(:, :, :)
         integer, intent(out), optional :: stat
 
-        call matrices(cores_of(body), [h], size(body), m, a, stat)
+        call matrices(cores_of(body), .false., [h], size(body), m, a, stat)
     end subroutine matrices_of_bodies_at_time
 
     !> The momenta and matrices of the n bodies body(n), by the times h(n).
@@ -114,7 +114,7 @@ contains
         real(wp), intent(inout), contiguous :: m(:, :), a(:, :, :)
         integer, intent(out), optional :: stat
 
-        call matrices(cores_of(body), h, count_of(body, h), m, a, stat)
+        call matrices(cores_of(body), .false., h, count_of(body, h), m, a, stat)
     end subroutine matrices_of_bodies_at_times
 
     !> The columns of n equal bodies, by h.
@@ -125,7 +125,7 @@ contains
         real(wp), intent(inout), optional :: q0(:), q1(:), q2(:), q3(:)
         integer, intent(out), optional :: stat
 
-        call columns([core_of(body)], [h], size(m1), m1, m2, m3, stat, q0, q1, q2, q3)
+        call columns([core_of(body)], .true., [h], size(m1), m1, m2, m3, stat, q0, q1, q2, q3)
     end subroutine columns_of_body_at_time
 
     !> The columns of n equal bodies, by the times h(n).
@@ -136,7 +136,7 @@ contains
         real(wp), intent(inout), optional :: q0(:), q1(:), q2(:), q3(:)
         integer, intent(out), optional :: stat
 
-        call columns([core_of(body)], h, size(h), m1, m2, m3, stat, q0, q1, q2, q3)
+        call columns([core_of(body)], .true., h, size(h), m1, m2, m3, stat, q0, q1, q2, q3)
     end subroutine columns_of_body_at_times
 
     !> The columns of the n bodies body(n), by h.
@@ -147,7 +147,7 @@ contains
         real(wp), intent(inout), optional :: q0(:), q1(:), q2(:), q3(:)
         integer, intent(out), optional :: stat
 
-        call columns(cores_of(body), [h], size(body), m1, m2, m3, stat, q0, q1, q2, q3)
+        call columns(cores_of(body), .false., [h], size(body), m1, m2, m3, stat, q0, q1, q2, q3)
     end subroutine columns_of_bodies_at_time
 
     !> The columns of the n bodies body(n), by the times h(n).
@@ -158,12 +158,13 @@ contains
         real(wp), intent(inout), optional :: q0(:), q1(:), q2(:), q3(:)
         integer, intent(out), optional :: stat
 
-        call columns(cores_of(body), h, count_of(body, h), m1, m2, m3, stat, q0, q1, q2, q3)
+        call columns(cores_of(body), .false., h, count_of(body, h), m1, m2, m3, stat, q0, q1, q2, q3)
     end subroutine columns_of_bodies_at_times
 
     !> n states in rows of m, and of q when present.
-    subroutine rows(core, h, n, m, stat, q)
+    subroutine rows(core, alike, h, n, m, stat, q)
         type(body_core), intent(in) :: core(:)
+        logical, intent(in) :: alike            !! core(1) is meant for all, whatever n
         real(wp), intent(in), contiguous :: h(:)
         integer, intent(in) :: n
         real(wp), intent(inout), contiguous :: m(:, :)
@@ -174,9 +175,9 @@ contains
         code = status_bad_count
         if (match(core, h, n) .and. size(m, 1) == 3 .and. size(m, 2) == n) then
             if (.not. present(q)) then
-                call flow_many(core, size(core), h, size(h), n, m, code)
+                call flow_many(core, size(core), alike, h, size(h), n, m, code)
             else if (size(q, 1) == 4 .and. size(q, 2) == n) then
-                call flow_many(core, size(core), h, size(h), n, m, code, q)
+                call flow_many(core, size(core), alike, h, size(h), n, m, code, q)
             end if
         end if
         call conclude(code, 'free_flow', stat)
@@ -184,8 +185,9 @@ contains
 
     !> n states with matrices: the turns of a chunk as quaternions, then the matrices by them. A matrix that
     !> is not finite is refused as a quaternion of norm zero is.
-    subroutine matrices(core, h, n, m, a, stat)
+    subroutine matrices(core, alike, h, n, m, a, stat)
         type(body_core), intent(in) :: core(:)
+        logical, intent(in) :: alike            !! core(1) is meant for all, whatever n
         real(wp), intent(in), contiguous :: h(:)
         integer, intent(in) :: n
         real(wp), intent(inout), contiguous :: m(:, :), a(:, :, :)
@@ -207,7 +209,7 @@ contains
                     if (all(ieee_is_finite(a(:, :, first + i - 1)))) q(1, i) = 1.0_wp
                 end do
                 associate (c => merge(first, 1, b > 1), s => merge(first, 1, t > 1))
-                    call flow_many(core(c:c + b - 1), b, h(s:s + t - 1), t, count, &
+                    call flow_many(core(c:c + b - 1), b, alike, h(s:s + t - 1), t, count, &
                                    m(:, first:first + count - 1), one, q)
                 end associate
                 code = max(code, one)
@@ -222,8 +224,9 @@ contains
 
     !> n states in columns. The q are nowhere `contiguous`: GCC reads the address of such an argument, absent
     !> or not, where it is passed on.
-    subroutine columns(core, h, n, m1, m2, m3, stat, q0, q1, q2, q3)
+    subroutine columns(core, alike, h, n, m1, m2, m3, stat, q0, q1, q2, q3)
         type(body_core), intent(in) :: core(:)
+        logical, intent(in) :: alike            !! core(1) is meant for all, whatever n
         real(wp), intent(in), contiguous :: h(:)
         integer, intent(in) :: n
         real(wp), intent(inout), contiguous :: m1(:), m2(:), m3(:)
@@ -235,10 +238,11 @@ contains
         if (match(core, h, n) .and. all([size(m1), size(m2), size(m3)] == n)) then
             if (present(q0) .and. present(q1) .and. present(q2) .and. present(q3)) then
                 if (all([size(q0), size(q1), size(q2), size(q3)] == n)) then
-                    call flow_columns(core, size(core), h, size(h), n, m1, m2, m3, code, q0, q1, q2, q3)
+                    call flow_columns(core, size(core), alike, h, size(h), n, m1, m2, m3, code, q0, q1, &
+                                      q2, q3)
                 end if
             else if (.not. (present(q0) .or. present(q1) .or. present(q2) .or. present(q3))) then
-                call flow_columns(core, size(core), h, size(h), n, m1, m2, m3, code)
+                call flow_columns(core, size(core), alike, h, size(h), n, m1, m2, m3, code)
             end if
         end if
         call conclude(code, 'free_flow_columns', stat)
