@@ -11,7 +11,7 @@ module frb_status
     implicit none
     private
 
-    public :: conclude, status_message
+    public :: return_or_stop, status_message
     public :: status_ok, status_bad_moments, status_bad_tensor, status_bad_momentum, status_bad_attitude
     public :: status_bad_time, status_bad_count, status_bad_option, status_bad_torque, status_bad_scheme
     public :: status_no_period, status_lapack_failed, status_stopped, status_not_offered
@@ -36,9 +36,9 @@ module frb_status
 contains
 
     !> Hands `code` to the caller when `stat` is present; otherwise stops if it says that something is wrong.
-    subroutine conclude(code, place, stat)
+    subroutine return_or_stop(code, place, stat)
         integer, intent(in) :: code             !! one of the codes of this module
-        character(*), intent(in) :: place       !! name of the routine that concludes
+        character(*), intent(in) :: place       !! name of the routine that returns or stops
         integer, intent(out), optional :: stat  !! receives `code`
 
         if (present(stat)) then
@@ -49,7 +49,7 @@ contains
             flush (error_unit)
             error stop 1
         end if
-    end subroutine conclude
+    end subroutine return_or_stop
 
     !> One line that says what a status code means.
     pure function status_message(code) result(message)

@@ -8,8 +8,8 @@ module frb_inertia
     use frb_kinds, only: wp
     use frb_lapack, only: dsyev
     use frb_rotations, only: cross, matrix_to_quat
-    use frb_status, only: conclude, status_ok, status_bad_moments, status_bad_momentum, status_bad_tensor, &
-        status_lapack_failed
+    use frb_status, only: return_or_stop, status_ok, status_bad_moments, status_bad_momentum, &
+        status_bad_tensor, status_lapack_failed
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
     use, intrinsic :: iso_c_binding, only: c_bool, c_double, c_int
     use, intrinsic :: iso_fortran_env, only: int32
@@ -187,7 +187,7 @@ contains
                 axes = identity
             end if
         end if
-        call conclude(code, 'principal_axes', stat)
+        call return_or_stop(code, 'principal_axes', stat)
     end subroutine principal_axes
 
     !> Where the smallest moment is only rounding beside the largest, the moments become those of a linear

@@ -8,7 +8,7 @@ module frb_matrix_step
     use frb_paper_motion, only: paper_motion, normal_form, attitude_code, simple_motion, add_momentum, &
         motion_elliptic
     use frb_rotations, only: cross, norm3, quat_rotate, quat_along
-    use frb_status, only: conclude, status_ok
+    use frb_status, only: return_or_stop, status_ok
     implicit none
     private
 
@@ -70,7 +70,7 @@ contains
             Piout = start_m
             Qout = start_q
         end if
-        call conclude(code, 'frb_step', stat)
+        call return_or_stop(code, 'frb_step', stat)
     end subroutine frb_step
 
     !> Qin E(q/|q|) as Qin + Qin (E(q/|q|) - 1), with E - 1 = 2 (q0 hat(q) + hat(q)**2)/|q|**2, (10): E is a

@@ -8,7 +8,7 @@ module frb_quat_step
     use frb_paper_motion, only: paper_motion, normal_form, attitude_code, simple_motion, add_momentum, &
         turn_from_one, motion_elliptic
     use frb_rotations, only: quat_product, quat_conjugate
-    use frb_status, only: conclude, status_ok, status_bad_option
+    use frb_status, only: return_or_stop, status_ok, status_bad_option
     implicit none
     private
 
@@ -82,7 +82,7 @@ contains
             Piout = start_m
             qout = start_q
         end if
-        call conclude(code, 'quat_step', stat)
+        call return_or_stop(code, 'quat_step', stat)
     end subroutine quat_step
 
     !> The change of the momentum and the turn of the body. Lines (5) to (21) of Algorithm 2: p(0)^-1 y(psi)

@@ -3,7 +3,7 @@ module frb_quadrature
     use frb_complements, only: modulus_complement, one_minus
     use frb_kinds, only: wp, most_points
     use frb_lapack, only: dstev
-    use frb_status, only: conclude, status_ok, status_bad_count, status_lapack_failed
+    use frb_status, only: return_or_stop, status_ok, status_bad_count, status_lapack_failed
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_value, ieee_quiet_nan, ieee_positive_inf
     use, intrinsic :: iso_fortran_env, only: int32
     implicit none
@@ -60,7 +60,7 @@ contains
         integer :: code
 
         call fill_rule(np, nodes, weights, code)
-        call conclude(code, 'gauss_legendre', stat)
+        call return_or_stop(code, 'gauss_legendre', stat)
     end subroutine gauss_legendre
 
     !> The integral of the third kind in Legendre's form (20),
@@ -107,7 +107,7 @@ contains
                                   weights(np:first:-1))
             end if
         end if
-        call conclude(code, 'eint_gauss', stat)
+        call return_or_stop(code, 'eint_gauss', stat)
     end function eint_gauss
 
     ! ------------------------------------------------------------------------------------------ inner parts

@@ -21,9 +21,9 @@ module frb_flow_bodies
 contains
 
     !> Many bodies in blocks, one per SIMD lane; body(:) holds one body for all or one for each, and so does
-    !> h(:). The blocks are independent: with -fopenmp they are shared among the threads. What becomes of a body
-    !> does not depend on the others: the same bits for any threads and parts of a batch. (So one body takes a
-    !> block too, though a call for it alone is faster.)
+    !> h(:). The blocks are independent: with -fopenmp they are shared among the threads. What becomes of a
+    !> body does not depend on the others: the same bits for any threads and parts of a batch. (So one body
+    !> takes a block too, though a call for it alone is faster.)
     subroutine flow_many(body, bodies, alike, h, times, n, m, code, q)
         integer, intent(in) :: bodies, times, n     !! bodies and times: 1 or n
         type(body_core), intent(in) :: body(:)

@@ -32,14 +32,14 @@ contains
         integer :: code
 
         call jacobian_body(body%core, h, m, code, jacobian)
-        if (code /= status_ok .or. present(stat)) call conclude(code, 'flow_tangent', stat)
+        if (code /= status_ok .or. present(stat)) call return_or_stop(code, 'flow_tangent', stat)
     end procedure tangent_of_momentum
 
     module procedure tangent_of_state
         integer :: code
 
         call tangent_body(body%core, h, m, code, 0, q, transition)
-        if (code /= status_ok .or. present(stat)) call conclude(code, 'flow_tangent', stat)
+        if (code /= status_ok .or. present(stat)) call return_or_stop(code, 'flow_tangent', stat)
     end procedure tangent_of_state
 
     module procedure tangent_and_inertia
@@ -53,14 +53,14 @@ contains
             transition = 0.0_wp
             by_moments = 0.0_wp
         end if
-        if (code /= status_ok .or. present(stat)) call conclude(code, 'flow_tangent', stat)
+        if (code /= status_ok .or. present(stat)) call return_or_stop(code, 'flow_tangent', stat)
     end procedure tangent_and_inertia
 
     module procedure tangent_and_tensor
         integer :: code
 
         call tangent_body(body%core, h, m, code, 6, q, transition, by_inertia=by_tensor)
-        if (code /= status_ok .or. present(stat)) call conclude(code, 'flow_tangent', stat)
+        if (code /= status_ok .or. present(stat)) call return_or_stop(code, 'flow_tangent', stat)
     end procedure tangent_and_tensor
 
     module procedure tangent_of_states
@@ -73,7 +73,7 @@ contains
         else
             transition = 0.0_wp
         end if
-        call conclude(code, 'flow_tangent', stat)
+        call return_or_stop(code, 'flow_tangent', stat)
     end procedure tangent_of_states
 
 end submodule frb_flow_tangent

@@ -27,7 +27,7 @@ module frb_free_flow
     use frb_flow_one, only: flow_body
     use frb_inertia, only: body_core, core_from_moments, core_from_tensor
     use frb_kinds, only: wp
-    use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_count
+    use frb_status, only: return_or_stop, status_ok, status_bad_attitude, status_bad_count
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
     implicit none
     private
@@ -233,7 +233,7 @@ contains
         integer :: code
 
         call flow_body(body%core, h, m, code)
-        if (code /= status_ok) call conclude(code, 'free_flow')
+        if (code /= status_ok) call return_or_stop(code, 'free_flow')
     end subroutine flow_momentum_or_stop
 
     !> Advances the momentum and the attitude quaternion of one body.
@@ -256,7 +256,7 @@ contains
         integer :: code
 
         call flow_body(body%core, h, m, code, q)
-        if (code /= status_ok) call conclude(code, 'free_flow')
+        if (code /= status_ok) call return_or_stop(code, 'free_flow')
     end subroutine flow_quaternion_or_stop
 
     !> Advances the momentum and the attitude matrix of one body.
@@ -302,7 +302,7 @@ contains
         integer :: code
 
         call flow_matrix(body, h, m, a, code)
-        if (code /= status_ok) call conclude(code, 'free_flow')
+        if (code /= status_ok) call return_or_stop(code, 'free_flow')
     end subroutine flow_matrix_or_stop
 
     !> Advances the momenta of n equal bodies.
@@ -315,7 +315,7 @@ contains
 
         code = status_bad_count
         if (size(m, 1) == 3) call flow_many([body%core], 1, .true., [h], 1, size(m, 2), m, code)
-        call conclude(code, 'free_flow', stat)
+        call return_or_stop(code, 'free_flow', stat)
     end subroutine flow_momenta
 
     !> Advances the momenta and attitudes of n equal bodies, in blocks that fill SIMD lanes. A body that is
@@ -332,7 +332,7 @@ contains
         if (size(m, 1) == 3 .and. size(q, 1) == 4 .and. size(m, 2) == size(q, 2)) then
             call flow_many([body%core], 1, .true., [h], 1, size(m, 2), m, code, q)
         end if
-        call conclude(code, 'free_flow', stat)
+        call return_or_stop(code, 'free_flow', stat)
     end subroutine flow_quaternions
 
     !> Advances the momenta of the n bodies body(:).
@@ -347,7 +347,7 @@ contains
         if (size(m, 1) == 3 .and. size(body) == size(m, 2)) then
             call flow_many(cores_of(body), size(body), .false., [h], 1, size(m, 2), m, code)
         end if
-        call conclude(code, 'free_flow', stat)
+        call return_or_stop(code, 'free_flow', stat)
     end subroutine flow_momenta_of_bodies
 
     !> Advances the momenta and attitudes of the n bodies body(:).
@@ -364,7 +364,7 @@ contains
             .and. size(body) == size(m, 2)) then
             call flow_many(cores_of(body), size(body), .false., [h], 1, size(m, 2), m, code, q)
         end if
-        call conclude(code, 'free_flow', stat)
+        call return_or_stop(code, 'free_flow', stat)
     end subroutine flow_quaternions_of_bodies
 
 end module frb_free_flow

@@ -5,7 +5,7 @@ module frb_free_flow_many
     use frb_free_flow, only: rigid_body, core_of, cores_of, turn_matrix
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
-    use frb_status, only: conclude, status_ok, status_bad_count
+    use frb_status, only: return_or_stop, status_ok, status_bad_count
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
     implicit none
     private
@@ -180,7 +180,7 @@ contains
                 call flow_many(core, size(core), alike, h, size(h), n, m, code, q)
             end if
         end if
-        call conclude(code, 'free_flow', stat)
+        call return_or_stop(code, 'free_flow', stat)
     end subroutine rows
 
     !> n states with matrices: the turns of a chunk as quaternions, then the matrices by them. A matrix that
@@ -219,7 +219,7 @@ contains
             end do
             !$omp end parallel do
         end if
-        call conclude(code, 'free_flow', stat)
+        call return_or_stop(code, 'free_flow', stat)
     end subroutine matrices
 
     !> n states in columns. The q are nowhere `contiguous`: GCC reads the address of such an argument, absent
@@ -245,7 +245,7 @@ contains
                 call flow_columns(core, size(core), alike, h, size(h), n, m1, m2, m3, code)
             end if
         end if
-        call conclude(code, 'free_flow_columns', stat)
+        call return_or_stop(code, 'free_flow_columns', stat)
     end subroutine columns
 
     !> The number of bodies that have a time each; -1, which `match` refuses, if there are not as many times.

@@ -10,8 +10,8 @@ module frb_free_motion
     use frb_inertia, only: body_core, keep_off_axis
     use frb_kinds, only: wp, two_pi
     use frb_rotations, only: norm3, quat_product, quat_rotate
-    use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_count, status_bad_momentum, &
-        status_bad_time
+    use frb_status, only: return_or_stop, status_ok, status_bad_attitude, status_bad_count, &
+        status_bad_momentum, status_bad_time
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_value, ieee_positive_inf, ieee_quiet_nan
     implicit none
     private
@@ -186,7 +186,7 @@ contains
                 call free_flow(self%body, rest, m, code)
             end if
         end if
-        call conclude(code, 'free_motion%at', stat)
+        call return_or_stop(code, 'free_motion%at', stat)
     end subroutine at_time
 
     !> m(3, n), and q(4, n) when present, at the n times t. status_bad_count if the sizes do not match.
@@ -221,7 +221,7 @@ contains
                 code = max(code, one)
             end do
         end if
-        call conclude(code, 'free_motion%at', stat)
+        call return_or_stop(code, 'free_motion%at', stat)
     end subroutine at_times
 
     !> The derivative of the state at t by that at t = 0, on (dm, dtheta) as in `flow_tangent`; 1 where `at`
@@ -242,7 +242,7 @@ contains
         else
             transition = reshape([(merge(1.0_wp, 0.0_wp, mod(i, 7) == 0), i=0, 35)], [6, 6])
         end if
-        call conclude(code, 'free_motion%tangent', stat)
+        call return_or_stop(code, 'free_motion%tangent', stat)
     end subroutine tangent
 
     !> Period of the momentum in the body; on a stable axis that of small oscillations about it; Inf where

@@ -8,7 +8,7 @@ module frb_drifts
     use frb_matrix_step, only: frb_step
     use frb_quat_step, only: quat_step
     use frb_rotations, only: cross, matrix_to_quat, quat_product
-    use frb_status, only: conclude, status_ok, status_bad_option
+    use frb_status, only: return_or_stop, status_ok, status_bad_option
     use frb_torque, only: body_drift
     implicit none
     private
@@ -74,7 +74,7 @@ contains
             end select
         end if
         if (.not. allocated(drift)) allocate (flow_drift :: drift)
-        call conclude(code, 'drift_by_name', stat)
+        call return_or_stop(code, 'drift_by_name', stat)
     end subroutine drift_by_name
 
     !> The exact flow.

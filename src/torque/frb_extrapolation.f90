@@ -16,7 +16,8 @@ module frb_extrapolation
     use frb_free_flow, only: core_of, rigid_body
     use frb_kinds, only: wp
     use frb_rotations, only: is_unit_quat, quat_conjugate, quat_product, quat_rotate
-    use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_count, status_bad_momentum, &
+    use frb_status, only: return_or_stop, status_ok, status_bad_attitude, status_bad_count, &
+        status_bad_momentum, &
         status_bad_option, status_bad_time, status_bad_torque, status_stopped, status_too_rough
     use frb_torque, only: body_scene, body_observer
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
@@ -124,7 +125,7 @@ contains
         if (present(report)) report = told
         ! A stop by an observer is no error.
         if (code == status_stopped .and. .not. present(stat)) return
-        call conclude(code, 'extrapolate', stat)
+        call return_or_stop(code, 'extrapolate', stat)
     end subroutine extrapolate_body
 
     !> n bodies that are alike.
@@ -182,7 +183,7 @@ contains
             if (code == status_ok .and. present(t) .and. size(m, 2) > 0) t = t_now
         end if
         if (present(report)) report = told
-        call conclude(code, 'extrapolate', stat)
+        call return_or_stop(code, 'extrapolate', stat)
     end subroutine extrapolate_bodies
 
     !> `status_ok`, or the error in times and tolerance.

@@ -9,8 +9,8 @@ module frb_splitting_many
     use frb_rotations, only: cross, is_unit_quat
     use frb_schemes, only: splitting_scheme
     use frb_splitting_plan, only: splitting_plan, run_basis, new_basis, check_run, next_time
-    use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_count, status_bad_momentum, &
-        status_bad_torque, status_not_offered, status_stopped
+    use frb_status, only: return_or_stop, status_ok, status_bad_attitude, status_bad_count, &
+        status_bad_momentum, status_bad_torque, status_not_offered, status_stopped
     use frb_torque, only: group_scene, group_observer, body_drift
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
     use, intrinsic :: iso_fortran_env, only: int64
@@ -101,7 +101,7 @@ contains
         end if
         ! A stop by an observer is no error.
         if (code == status_stopped .and. .not. present(stat)) return
-        call conclude(code, 'integrate', stat)
+        call return_or_stop(code, 'integrate', stat)
     end subroutine integrate_group
 
     include 'splitting_steps.inc'

@@ -5,8 +5,8 @@ module frb_splitting_tangent
     use frb_rotations, only: is_unit_quat
     use frb_schemes, only: splitting_scheme
     use frb_splitting_plan, only: check_run, next_time, splitting_plan
-    use frb_status, only: conclude, status_ok, status_bad_attitude, status_bad_momentum, status_bad_torque, &
-        status_not_offered
+    use frb_status, only: return_or_stop, status_ok, status_bad_attitude, status_bad_momentum, &
+        status_bad_torque, status_not_offered
     use frb_torque, only: body_scene
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
     use, intrinsic :: iso_fortran_env, only: int64
@@ -80,7 +80,7 @@ contains
         else
             transition = one
         end if
-        call conclude(code, 'integrate_tangent', stat)
+        call return_or_stop(code, 'integrate_tangent', stat)
     end subroutine integrate_tangent
 
 end module frb_splitting_tangent

@@ -3,8 +3,8 @@ module frb_thermostats
     use frb_free_flow, only: core_of, rigid_body
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
-    use frb_status, only: conclude, status_ok, status_bad_count, status_bad_momentum, status_bad_option, &
-        status_bad_time
+    use frb_status, only: return_or_stop, status_ok, status_bad_count, status_bad_momentum, &
+        status_bad_option, status_bad_time
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
     implicit none
     private
@@ -134,7 +134,7 @@ contains
                 end if
             end do
         end if
-        call conclude(code, 'langevin_kick', stat)
+        call return_or_stop(code, 'langevin_kick', stat)
     end subroutine kick_bodies_axes
 
     !> `status_ok`, or the code of the first error.
