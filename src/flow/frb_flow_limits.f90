@@ -8,7 +8,10 @@ module frb_flow_limits
     public :: most_halvings
     public :: short_limit, tiny_limit, tiny_turn_limit, small_turn_limit, middle_limit, middle_turn_limit
     public :: square_limit, period_limit, smallest_denominator, sin_cos_limit, plain_largest, plain_smallest
+    public :: tiny_step, short_step, middle_step, beyond_series
 
+    !> The series that a step of one body uses.
+    integer, parameter :: tiny_step = 1, short_step = 2, middle_step = 3, beyond_series = 4
     !> A bound for NaN, where a compiler assumes that there is none: 10 are needed after settled times.
     integer, parameter :: most_halvings = 16
     real(wp), parameter :: short_limit = 0.002_wp       !! largest max(P, R) (h/2)^2 of the short series

@@ -15,18 +15,4 @@ contains
 
     include 'long_step.inc'
 
-    include 'period_formulas.inc'
-
-    include 'orbit_formulas.inc'
-
-    include 'middle_formulas.inc'
-
-    include 'middle_third_kind.inc'
-
-    include 'long_formulas.inc'
-
-    include 'angle_formulas.inc'
-
-    include 'join_formulas.inc'
-
 end module frb_flow_long

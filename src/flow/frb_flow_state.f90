@@ -1,7 +1,7 @@
 !> A step of momentum and attitude of one body, in its principal axes: see one_step.inc.
 module frb_flow_state
     use frb_flow_limits, only: short_limit, tiny_limit, tiny_turn_limit, small_turn_limit, middle_limit, &
-        middle_turn_limit, plain_largest, plain_smallest
+        middle_turn_limit, plain_largest, plain_smallest, tiny_step, short_step, middle_step, beyond_series
     use frb_flow_long, only: long_step
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
@@ -12,36 +12,10 @@ module frb_flow_state
 
     public :: flow_one
 
-    !> The series that a step uses.
-    integer, parameter :: tiny_step = 1, short_step = 2, middle_step = 3, beyond_series = 4
     logical, parameter :: with_attitude = .true.
 
 contains
 
     include 'one_step.inc'
-
-    include 'orbit_formulas.inc'
-
-    include 'series_formulas.inc'
-
-    include 'short_third_kind.inc'
-
-    include 'tiny_formulas.inc'
-
-    include 'tiny_third_kind.inc'
-
-    include 'short_formulas.inc'
-
-    include 'unit_turn_formulas.inc'
-
-    include 'middle_formulas.inc'
-
-    include 'middle_third_kind.inc'
-
-    include 'turn_formulas.inc'
-
-    include 'join_formulas.inc'
-
-    include 'reach_formulas.inc'
 
 end module frb_flow_state

@@ -295,17 +295,7 @@ contains
 
     include 'tangent_forms.inc'
 
-    include 'orbit_formulas.inc'
-
-    include 'middle_formulas.inc'
-
-    include 'middle_third_kind.inc'
-
-    include 'long_formulas.inc'
-
-    include 'angle_formulas.inc'
-
-    include 'join_formulas.inc'
+    include 'all_doublings.inc'
 
     include 'tangent_formulas.inc'
 

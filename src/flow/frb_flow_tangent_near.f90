@@ -255,23 +255,7 @@ contains
         end do
     end subroutine find_covectors
 
-    include 'series_formulas.inc'
-
-    include 'short_third_kind.inc'
-
-    include 'tiny_formulas.inc'
-
-    include 'tiny_third_kind.inc'
-
-    include 'short_formulas.inc'
-
-    include 'unit_turn_formulas.inc'
-
-    include 'middle_formulas.inc'
-
-    include 'middle_third_kind.inc'
-
-    include 'join_formulas.inc'
+    include 'all_series.inc'
 
     include 'angle_formulas.inc'
 

@@ -217,25 +217,9 @@ contains
 
     include 'orbit_formulas.inc'
 
-    include 'series_formulas.inc'
-
-    include 'short_third_kind.inc'
-
-    include 'tiny_formulas.inc'
-
-    include 'tiny_third_kind.inc'
-
-    include 'short_formulas.inc'
-
-    include 'unit_turn_formulas.inc'
-
-    include 'middle_formulas.inc'
-
-    include 'middle_third_kind.inc'
+    include 'all_series.inc'
 
     include 'turn_formulas.inc'
-
-    include 'join_formulas.inc'
 
     include 'reach_formulas.inc'
 
