@@ -2,7 +2,7 @@
 module frb_flow_momentum
     use frb_flow_limits, only: short_limit, tiny_limit, tiny_turn_limit, small_turn_limit, middle_limit, &
         middle_turn_limit, plain_largest, plain_smallest, tiny_step, short_step, middle_step, beyond_series
-    use frb_flow_long_momentum, only: long_step
+    use frb_flow_long, only: long_step
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
     use frb_status, only: status_ok, status_bad_momentum, status_bad_attitude, status_bad_time

@@ -9,7 +9,7 @@ module frb_flow_tangent_periods
 
 contains
 
-    !> As in long_step.inc, with the integrals D and `own` over the periods that are removed.
+    !> As in frb_flow_long, with the integrals D and `own` over the periods that are removed.
     pure subroutine reduce_periods(pmax, delta, nu, with_third, fraction, turned, whole_third, whole_dd, &
                                    whole_own)
         real(wp), intent(in) :: pmax, delta, nu
