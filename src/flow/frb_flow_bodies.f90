@@ -218,6 +218,7 @@ contains
 
     contains
 
+        !> The states u, v of all lanes, whole vectors or a part.
         subroutine flow_lanes(in_part, u, v)
             logical, intent(in) :: in_part
             real(wp), intent(inout) :: u(lanes, 3), v(lanes, 4)
@@ -337,6 +338,7 @@ contains
         one = merge(1_int64, 0_int64, total < 0.25_wp*plain_largest)
     end function plain_attitude
 
+    !> m + d.
     pure subroutine add(n, d, m)
         integer, intent(in) :: n
         real(wp), intent(in) :: d(n)

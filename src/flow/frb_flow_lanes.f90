@@ -230,6 +230,7 @@ contains
         include 'lane_momentum.inc'
     end subroutine move
 
+    !> The same; what the attitude needs is kept.
     pure subroutine move_and_keep(n, of, x1, x2, x3, work)
         logical, parameter :: keep = .true.
         include 'lane_momentum.inc'
@@ -280,6 +281,7 @@ contains
         end do
     end subroutine short_angles
 
+    !> As short_angles, for middle steps.
     pure subroutine middle_angles(n, of, work)
         integer, intent(in) :: n
         type(lane_bodies), intent(in) :: of

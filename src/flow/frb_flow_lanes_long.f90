@@ -158,6 +158,7 @@ contains
         end do
     end subroutine double_squares
 
+    !> A doubling of s, c, d; only in lanes that need i more.
     pure subroutine double_triples(n, i, at)
         integer, intent(in) :: n
         real(wp), intent(in) :: i
@@ -220,6 +221,7 @@ contains
         end do
     end subroutine form_anew
 
+    !> The increments of the momentum, and the momentum at mid-step.
     pure subroutine move(n, of, at, work)
         integer, intent(in) :: n
         type(lane_bodies), intent(in) :: of

@@ -91,6 +91,7 @@ contains
         call set_displaced(scheme, displaced)
     end function scheme_by_name
 
+    !> The coefficients of a scheme whose kicks are plain; `status_bad_option` for any other name.
     pure function scheme_of_plain_kicks(name) result(scheme)
         character(*), intent(in) :: name
         type(splitting_scheme) :: scheme
@@ -150,6 +151,7 @@ contains
         end select
     end function scheme_of_plain_kicks
 
+    !> The coefficients of a scheme with modified kicks; `status_bad_option` for any other name.
     pure function scheme_of_modified_kicks(name) result(scheme)
         character(*), intent(in) :: name
         type(splitting_scheme) :: scheme

@@ -266,6 +266,7 @@ contains
         end if
     end subroutine advance_all
 
+    !> Keeps the state at the start of a step.
     subroutine keep(run)
         type(moving), intent(inout) :: run
 
@@ -277,6 +278,7 @@ contains
         end if
     end subroutine keep
 
+    !> Goes back to the state at the start of the step.
     subroutine go_back(run)
         type(moving), intent(inout) :: run
 

@@ -222,6 +222,7 @@ contains
         end if
     end subroutine advance
 
+    !> Keeps the state at the start of a step.
     subroutine keep(run)
         type(moving), intent(inout) :: run
 
@@ -233,6 +234,7 @@ contains
         end if
     end subroutine keep
 
+    !> Goes back to the state at the start of the step.
     subroutine go_back(run)
         type(moving), intent(inout) :: run
 
