@@ -5,7 +5,7 @@ bin=$prefix/bin
 
 # A driver runs from any folder.
 install_elsewhere() {
-    "$fpm" install --prefix "$prefix" --profile release
+    ./run fpm install --prefix "$prefix" --profile release
     [ -e "$prefix/lib/libfrb.a" ]
     [ -e "$prefix/include/frb.mod" ]
     mkdir "$work/elsewhere"

@@ -38,7 +38,7 @@ contains
         type(triple), pointer :: three
 
         stat = status_bad_moments
-        if (.not. c_associated(moments)) return
+        if (.not. (c_associated(moments) .and. c_associated(body))) return
         call c_f_pointer(moments, three)
         call store_body(core_from_moments(three%x), body, stat)
     end function c_body_from_moments
@@ -50,7 +50,7 @@ contains
         type(matrix), pointer :: nine
 
         stat = status_bad_tensor
-        if (.not. c_associated(tensor)) return
+        if (.not. (c_associated(tensor) .and. c_associated(body))) return
         call c_f_pointer(tensor, nine)
         call store_body(core_from_tensor(nine%x), body, stat)
     end function c_body_from_tensor

@@ -52,14 +52,13 @@ contains
         stat = status_ok
     end subroutine find_state
 
-    !> Puts a body into the caller's memory and tells its status; without memory `stat` stays.
+    !> Puts a body into the caller's memory and tells its status.
     subroutine store_body(made, body, stat)
         type(body_core), intent(in) :: made
         type(c_ptr), intent(in) :: body
-        integer(c_int), intent(inout) :: stat
+        integer(c_int), intent(out) :: stat
         type(body_core), pointer :: core
 
-        if (.not. c_associated(body)) return
         call c_f_pointer(body, core)
         core = made
         stat = made%status
