@@ -1,5 +1,5 @@
 !> A scene whose torque costs next to nothing, so that the loop around it shows.
-module easy_scene
+module frb_easy_scene
     use frb, only: wp, group_scene, status_ok
     implicit none
     private
@@ -24,12 +24,12 @@ contains
         stat = status_ok
     end subroutine torques
 
-end module easy_scene
+end module frb_easy_scene
 
 !> Ratios of time within one process: a call through the C interface to the Fortran call, and the user's own
 !> loop over a splitting plan to `integrate`, for different bodies.
 program loops
-    use easy_scene, only: easy
+    use frb_easy_scene, only: easy
     use frb, only: wp, rigid_body, free_flow, integrate, splitting_scheme, splitting_plan
     use, intrinsic :: iso_c_binding, only: c_double, c_int, c_loc, c_ptr
     use, intrinsic :: iso_fortran_env, only: int64
