@@ -4,7 +4,7 @@
 !> does not change.
 !> J. Wisdom, S. J. Peale, F. Mignard, Icarus 58 (1984) 137.
 module frb_tumbler
-    use frb, only: wp, body_scene, quat_conjugate, quat_rotate, status_ok
+    use frb, only: wp, body_scene, quat_rotate_back, status_ok
     implicit none
     private
 

@@ -3,7 +3,7 @@
 !> tumbling moon like Hyperion are chaotic; for the free body and the Lagrange top the
 !> exponent falls to 0 as log t/t. Rounding decides where a chaotic orbit goes, so two digits are shown.
 module frb_chaotic_moon
-    use frb, only: wp, body_scene, quat_conjugate, quat_rotate, status_ok
+    use frb, only: wp, body_scene, quat_rotate_back, status_ok
     implicit none
     private
 

@@ -2,7 +2,7 @@
 !> V = 3/2 u . I u with u = Q^T e, e the direction to the centre of the Earth, which turns once per orbit; the
 !> torque is 3 u x I u. Nothing else acts: no drag, no flexing, a spherical Earth.
 module frb_satellite
-    use frb, only: wp, body_scene, quat_conjugate, quat_rotate, status_ok
+    use frb, only: wp, body_scene, quat_rotate, quat_rotate_back, status_ok
     implicit none
     private
 
@@ -32,7 +32,7 @@ contains
         integer, intent(out) :: stat
         real(wp) :: u(3)
 
-        u = quat_rotate(quat_conjugate(q), to_earth(t))
+        u = quat_rotate_back(q, to_earth(t))
         tau = 3*[(self%moments(3) - self%moments(2))*u(2)*u(3), &
                  (self%moments(1) - self%moments(3))*u(3)*u(1), &
                  (self%moments(2) - self%moments(1))*u(1)*u(2)]
@@ -45,7 +45,7 @@ contains
         real(wp), intent(out) :: v
         integer, intent(out) :: stat
 
-        v = 1.5_wp*sum(self%moments*quat_rotate(quat_conjugate(q), to_earth(t))**2)
+        v = 1.5_wp*sum(self%moments*quat_rotate_back(q, to_earth(t))**2)
         stat = status_ok
     end subroutine potential
 

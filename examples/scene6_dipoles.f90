@@ -2,7 +2,7 @@
 !> all the others: V = sum over pairs of (p_i . p_j - 3 (p_i . r)(p_j . r)/|r|^2)/|r|^3. No image charges, no
 !> damping. The torques cost N^2, the free flow N.
 module frb_dipole_lattice
-    use frb, only: wp, group_scene, quat_conjugate, quat_rotate, status_ok
+    use frb, only: wp, group_scene, quat_rotate, quat_rotate_back, status_ok
     implicit none
     private
 
@@ -54,9 +54,9 @@ contains
         end associate
         call field(self, q, p, e)
         do i = 1, size(q, 2)
-            tau(:, i) = quat_rotate(quat_conjugate(q(:, i)), &
-                                    [p(2, i)*e(3, i) - p(3, i)*e(2, i), p(3, i)*e(1, i) - p(1, i)*e(3, i), &
-                                     p(1, i)*e(2, i) - p(2, i)*e(1, i)])
+            tau(:, i) = quat_rotate_back(q(:, i), [p(2, i)*e(3, i) - p(3, i)*e(2, i), &
+                                                   p(3, i)*e(1, i) - p(1, i)*e(3, i), &
+                                                   p(1, i)*e(2, i) - p(2, i)*e(1, i)])
         end do
         stat = status_ok
     end subroutine torques

@@ -4,7 +4,7 @@
 !> of the angular momenta of orbit and spin is kept to rounding, the energy to the error of the scheme. No
 !> tides. Lengths in km, times in h, masses in 1e12 kg.
 module frb_pair
-    use frb, only: wp, quat_conjugate, quat_rotate
+    use frb, only: wp, quat_rotate, quat_rotate_back
     implicit none
     private
 
@@ -33,7 +33,7 @@ contains
         real(wp) :: r, u(3), iu(3), uiu, gm
 
         r = norm2(x)
-        u = quat_rotate(quat_conjugate(q), x/r)
+        u = quat_rotate_back(q, x/r)
         iu = moments*u
         uiu = dot_product(u, iu)
         gm = gravity*sphere

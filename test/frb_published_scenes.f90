@@ -1,7 +1,7 @@
 !> Scenes of published motions: the gravity gradient along a Kepler orbit, and a pulse of torque in time.
 module frb_gradient_scene
+    use frb_frames, only: quat_rotate_back
     use frb_kinds, only: wp
-    use frb_rotations, only: quat_conjugate, quat_rotate
     use frb_status, only: status_ok
     use frb_torque, only: body_scene
     implicit none

@@ -198,7 +198,7 @@ contains
 
         call open_script(options, 'failure', 1000, 1080, file)
         call begin_panels(file, 'Largest error of '//either(options%quick, '2', '7')// &
-                          ' random cases; 1 unit: what rounding the inputs costs anyone')
+                          ' random cases; 1 unit: the error that rounding the input causes')
         do p = 1, panels
             call begin_panel(file, p, [character(80) :: 'set xrange [3e-9:3e8]', &
                 'set xtics ("10^{-8}" 1e-8, "10^{-4}" 1e-4, "1" 1, "10^4" 1e4, "10^8" 1e8)'])
@@ -235,7 +235,7 @@ contains
 
         call file%put('set multiplot title "'//title//'"')
         call file%put_lines([character(width) :: 'set logscale xy', 'set format y "10^{%T}"', &
-            'set yrange [5e-3:1e19]', 'set ytics 1,1e4', 'set ytics add ("NaN" 1e18)', 'unset key', &
+            'set yrange [5e-3:1e19]', 'set ytics 1,1e4', 'set mytics 1', 'set ytics add ("NaN" 1e18)', 'unset key', &
             'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0', 'set size 0.25,0.195'])
     end subroutine begin_panels
 

@@ -119,7 +119,7 @@ contains
         high = (340.0_wp*spans)/(160 + 340*spans)
         call file%put_lines([character(width) :: 'set multiplot', 'set logscale xy', &
             'set format x "10^{%T}"', 'set format y "10^{%T}"', 'set yrange [1e-15:10]', &
-            'set ytics 1e-15,1e3', 'unset key', 'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0'])
+            'set ytics 1e-15,1e3', 'set mytics 1', 'unset key', 'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0'])
         do s = 1, spans
             write (digits, '(i0)') durations(s)
             do column = 1, 2
@@ -131,7 +131,7 @@ contains
                 call file%put('set title "'//trim(top%title)//', t = '//trim(digits)//'" offset 0,-0.6')
                 if (column == 1) then
                     call file%put_lines([character(width) :: 'set xlabel "time spent  [ns]" offset 0,0.4', &
-                        'set ylabel "error of attitude  [rad]"', 'plot \'])
+                        'set ylabel "error of attitude  [rad]" offset 2.5,0', 'plot \'])
                 else
                     call file%put_lines([character(width) :: 'set xlabel "torques" offset 0,0.4', &
                         'unset ylabel', 'plot \'])
@@ -186,6 +186,7 @@ contains
         type(top_at_start) :: top
         type(chart_file) :: file
         real(wp) :: seconds(5), longest
+        character(20) :: words
         integer :: number, i
 
         longest = merge(1.0e3_wp, 1.0e5_wp, options%quick)
@@ -200,17 +201,22 @@ contains
         end do
         call open_script(options, 'heavy-top-energy', 1000, 480, file)
         call file%put_lines([character(width) :: 'set multiplot layout 1,2', 'set logscale xy', &
-            'set format x "10^{%T}"', 'set format y "10^{%T}"', 'set yrange [1e-16:1e-3]', &
-            'set xlabel "t"', 'set ylabel "largest error of the energy"', 'set key top left', &
-            'set xrange [4:*]'])
+            'set format x "10^{%T}"', 'set format y "10^{%T}"', 'set yrange [1e-18:1e-5]', 'set mytics 1', &
+            'set xlabel "t"', 'set ylabel "largest error of the energy"', &
+            'set key bottom right Left reverse samplen 2.2', 'set xrange [4:*]'])
         do number = 1, 2
             top = one_top(number)
             call file%put('set title "'//trim(top%title)//'"')
             call file%put('plot \')
             do i = 1, size(solvers)
-                write (file%line, '(a,i0,a,es8.1,a)') '  "heavy-top-energy-'//trim(top%name)// &
+                if (solvers(i)%drift == 'flow') then
+                    write (words, '(a,f5.2)') ', h =', setting(i, number)
+                else
+                    write (words, '(a,i0)') ', tolerance 1e', nint(log10(setting(i, number)))
+                end if
+                write (file%line, '(a,i0,a)') '  "heavy-top-energy-'//trim(top%name)// &
                     '.dat" index ', i - 1, ' using 1:2'//curve(solvers(i))//' title "'// &
-                    trim(solvers(i)%with), setting(i, number), '"'//either(i == size(solvers), '', ', \')
+                    trim(solvers(i)%with)//trim(words)//'"'//either(i == size(solvers), '', ', \')
                 call file%put()
             end do
         end do

@@ -1,5 +1,5 @@
-!> Pictures of the motion itself: `orbits` (the polhodes on the sphere of the momentum) and `racket` (the
-!> flips of a tennis racket, with the errors of energy and momentum below).
+!> Pictures of the motion itself: `orbits` (the polhodes on the sphere of the momentum, and the flips of a
+!> tennis racket) and `racket` (the flips again, and below them the errors of energy and momentum).
 module frb_chart_orbits
     use frb, only: wp, rigid_body, free_flow, quat_rotate
     use frb_chart_methods, only: method, advance, find_method
@@ -8,12 +8,25 @@ module frb_chart_orbits
     implicit none
     private
 
-    public :: chart_orbits, chart_racket
+    public :: chart_orbits
+
+    !> The methods whose errors are shown below the flips of the racket.
+    character(*), parameter :: racket_methods(*) = [character(12) :: 'flow', 'dmv10', 'rk4', 'dp-12']
 
 contains
 
-    !> Polhodes of a body with moments (1, 2, 3), seen from a point between the three axes.
+    !> Polhodes on the sphere, beside them the flips of a racket; then the racket with the errors of methods.
     subroutine chart_orbits(options)
+        type(settings), intent(in) :: options
+
+        call write_polhodes(options)
+        call write_racket(options)
+        call draw_orbits(options)
+        call draw_racket(options)
+    end subroutine chart_orbits
+
+    !> Polhodes of a body with moments (1, 2, 3), seen from a point between the three axes.
+    subroutine write_polhodes(options)
         type(settings), intent(in) :: options
         real(wp), parameter :: moments(3) = [1.0_wp, 2.0_wp, 3.0_wp]
         real(wp), parameter :: angles(*) = [6.0_wp, 14.0_wp, 22.0_wp, 27.0_wp, 33.0_wp, 40.0_wp, 50.0_wp, &
@@ -58,25 +71,51 @@ contains
             end do
         end do
         call file%finish()
-        call open_script(options, 'orbits', 660, 600, file)
+    end subroutine write_polhodes
+
+    !> The sphere on the left, the angular velocity of the racket on the right.
+    subroutine draw_orbits(options)
+        type(settings), intent(in) :: options
+        type(chart_file) :: file
+
+        call open_script(options, 'orbits', 1000, 480, file)
         call file%put_lines([character(width) :: &
-            'unset border', 'unset tics', 'unset grid', 'set size ratio -1', 'unset key', &
-            'set xrange [-1.2:1.5]', 'set yrange [-1.1:1.3]', &
+            'set multiplot', 'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0', &
+            'set origin 0.57,0.14', 'set size 0.41,0.76', 'set xrange [0:200]', &
+            'set title "A tennis racket, I = (3, 5, 7), turns over again and again" offset 0,-0.3', &
+            'set xlabel "time"', 'set ylabel "angular velocity, body axes"'])
+        call plot_flips(file)
+        call file%put_lines([character(width) :: &
+            'set origin 0.0,0.0', 'set size 0.5,0.88', 'unset border', 'unset tics', 'unset grid', &
+            'unset xlabel', 'unset ylabel', 'set size ratio -1', 'unset key', &
+            'set xrange [-1.35:1.45]', 'set yrange [-1.1:1.3]', &
             'set object 1 circle at 0,0 size first 1 fillstyle solid border lc rgb "#888888" fc rgb '// &
             '"#f4f4f4" behind', &
-            'set title "Momentum of a free body, I = (1, 2, 3): every orbit is one formula"'])
+            'set title "The momentum of a free body, I = (1, 2, 3)" offset 0,0.4'])
         call label_axis(file, [1.0_wp, 0.0_wp, 0.0_wp], 'axis 1')
-        call label_axis(file, [0.0_wp, 1.0_wp, 0.0_wp], 'axis 2 (unstable)')
+        call label_axis(file, [0.0_wp, 1.0_wp, 0.0_wp], 'axis 2')
         call label_axis(file, [0.0_wp, 0.0_wp, 1.0_wp], 'axis 3')
         call file%put_lines([character(width) :: &
-            'set label 99 "separatrix" tc rgb "#D55E00" at graph 0.02,0.06 front', 'plot \', &
+            'set label 99 "separatrix" tc rgb "#D55E00" at graph 0.02,0.03 front', 'plot \', &
             '  for [k=4:27] "orbits.dat" index k using 1:($3<1?$2:NaN) with lines lc rgb "#cfdbe6" lw 1, \', &
             '  for [k=0:3] "orbits.dat" index k using 1:($3<1?$2:NaN) with lines lc rgb "#f0c9b0" lw 2, \', &
-            '  for [k=4:27] "orbits.dat" index k using 1:($3>0?$2:NaN) with lines lc rgb "#0072B2" lw 2, \', &
-            '  for [k=0:3] "orbits.dat" index k using 1:($3>0?$2:NaN) with lines lc rgb "#D55E00" lw 4'])
+            '  for [k=4:27] "orbits.dat" index k using 1:($3>0?$2:NaN) with lines lc rgb "#0072B2" lw 1.6, \', &
+            '  for [k=0:3] "orbits.dat" index k using 1:($3>0?$2:NaN) with lines lc rgb "#D55E00" lw 3.2', &
+            'unset multiplot'])
         call file%finish()
         call draw(options, 'orbits')
-    end subroutine chart_orbits
+    end subroutine draw_orbits
+
+    !> The three curves of the angular velocity of the racket.
+    subroutine plot_flips(file)
+        type(chart_file), intent(inout) :: file
+
+        call file%put_lines([character(width) :: &
+            'set yrange [-0.52:0.62]', 'set key top center horizontal samplen 2.2', 'plot \', &
+            '  "racket.dat" index 0 using 1:2 with lines lt 3 lw 2 title "ω_1", \', &
+            '  "" index 0 using 1:3 with lines lt 2 lw 3 title "ω_2", \', &
+            '  "" index 0 using 1:4 with lines lt 4 lw 2 title "ω_3"'])
+    end subroutine plot_flips
 
     !> One point of a curve on the sphere.
     subroutine put(file, m)
@@ -101,31 +140,30 @@ contains
         seen = [dot_product(right, m), dot_product(up, m), dot_product(eye, m)]
     end function view
 
+    !> An arrow that continues an axis out of the sphere, and its name beyond the tip.
     subroutine label_axis(file, axis, text)
         type(chart_file), intent(inout) :: file
         real(wp), intent(in) :: axis(3)
         character(*), intent(in) :: text
-        real(wp) :: tip(3), out(3)
+        real(wp) :: from(3), outwards(2)
 
-        tip = view(axis)
-        out = view(1.35_wp*axis)
-        write (file%line, '(4(a,f7.3),a)') 'set arrow from ', tip(1), ',', tip(2), ' to ', out(1), ',', &
-            out(2), &
-            ' head filled size 0.04,20 lc rgb "#000000" lw 2 front'
+        from = view(axis)
+        outwards = from(1:2)/norm2(from(1:2))
+        write (file%line, '(4(a,f7.3),a)') 'set arrow from ', from(1), ',', from(2), ' to ', &
+            1.2_wp*outwards(1), ',', 1.2_wp*outwards(2), ' head filled size 0.05,20 lc rgb "#000000" lw 2 front'
         call file%put()
-        write (file%line, '(a,f7.3,a,f7.3,a)') 'set label "'//text//'" at ', out(1), ',', out(2), &
-            ' '//either(tip(1) > 0.5_wp, 'center offset 0,-1.0', 'center offset 0,0.9')//' front'
+        write (file%line, '(a,f7.3,a,f7.3,a)') 'set label "'//text//'" at ', 1.3_wp*outwards(1), ',', &
+            1.3_wp*outwards(2), either(outwards(1) > 0.5_wp, ' left offset -0.8,0', ' center')//' front'
         call file%put()
     end subroutine label_axis
 
-    !> The tennis racket turned about its middle axis: flips, and how well methods keep energy and momentum.
-    subroutine chart_racket(options)
+    !> The motion of a tennis racket that starts close to its middle axis, by several methods, with their
+    !> errors of energy and momentum.
+    subroutine write_racket(options)
         type(settings), intent(in) :: options
         real(wp), parameter :: moments(3) = [3.0_wp, 5.0_wp, 7.0_wp]
         real(wp), parameter :: m0(3) = [0.0_wp, 2.0_wp, 0.01_wp], h = 0.1_wp
-        integer, parameter :: steps = 1000
-        character(*), parameter :: keys(*) = [character(12) :: 'flow', 'dmv10', 'rk4', 'dp-12']
-        integer, parameter :: points(*) = [7, 4, 2, 1]
+        integer, parameter :: steps = 2000
         type(method) :: with
         real(wp) :: m(3), q(4), energy0, energy, space(3)
         type(chart_file) :: file
@@ -137,11 +175,11 @@ contains
             't, omega1, omega2, omega3, relative error of the energy, error of the momentum '// &
             'in space over its norm', file)
         energy0 = sum(m0**2/moments)/2
-        do i = 1, size(keys)
-            with = find_method(trim(keys(i)))
+        do i = 1, size(racket_methods)
+            with = find_method(trim(racket_methods(i)))
             m = m0
             q = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-            call file%put('# method: '//trim(keys(i)))
+            call file%put('# method: '//trim(racket_methods(i)))
             do k = 0, steps
                 energy = sum(m**2/moments)/2
                 space = quat_rotate(q, m) - m0
@@ -155,31 +193,38 @@ contains
             call file%end_block()
         end do
         call file%finish()
+    end subroutine write_racket
+
+    !> The flips of the racket, and how well methods keep its energy.
+    subroutine draw_racket(options)
+        type(settings), intent(in) :: options
+        integer, parameter :: symbols(*) = [7, 4, 2, 1]
+        type(method) :: with
+        type(chart_file) :: file
+        integer :: i
+
         call open_script(options, 'racket', 900, 640, file)
         call file%put_lines([character(width) :: &
-            'set multiplot', 'set xrange [0:100]', 'set lmargin at screen 0.1', &
+            'set multiplot', 'set xrange [0:200]', 'set lmargin at screen 0.1', &
             'set rmargin at screen 0.97', 'set bmargin at screen 0.56', 'set tmargin at screen 0.92', &
             'set title "Tennis racket spun about its middle axis: a flip every half period" offset 0,-0.5', &
-            'set ylabel "ω  [rad per unit of time]"', 'set yrange [-0.52:0.62]', &
-            'set format x ""', 'set key top center horizontal samplen 2.2', 'plot \', &
-            '  "racket.dat" index 0 using 1:2 with lines lt 3 lw 2 title "ω_1", \', &
-            '  "" index 0 using 1:3 with lines lt 2 lw 3 title "ω_2", \', &
-            '  "" index 0 using 1:4 with lines lt 4 lw 2 title "ω_3"', &
+            'set ylabel "ω  [rad per unit of time]"', 'set format x ""'])
+        call plot_flips(file)
+        call file%put_lines([character(width) :: &
             'unset title', 'set bmargin at screen 0.11', 'set tmargin at screen 0.53', 'set logscale y', &
             'set format x "%g"', 'set format y "10^{%T}"', 'set yrange [5e-18:1e1]', 'set xlabel "time"', &
-            'set ytics 1e-16,1e4', 'set ylabel "relative error of energy"', &
+            'set ytics 1e-16,1e4', 'set mytics 1', 'set ylabel "relative error of energy"', &
             'set key top center horizontal', 'plot \'])
-        do i = 1, size(keys)
-            with = find_method(trim(keys(i)))
-            write (file%line, '(a,i0,a,i0,a,i0,a,i0,a)') '  "racket.dat" index ', i - 1, &
-                ' using 1:5 every 5 with points lt ', &
-                with%colour, ' pt ', points(i), ' ps ', 1, '*0.5 title "'//trim(with%label)// &
-                '"'//either(i == size(keys), '', ', \')
+        do i = 1, size(racket_methods)
+            with = find_method(trim(racket_methods(i)))
+            write (file%line, '(3(a,i0),a)') '  "racket.dat" index ', i - 1, &
+                ' using 1:5 every 10 with points lt ', with%colour, ' pt ', symbols(i), &
+                ' ps 0.5 title "'//trim(with%label)//'"'//either(i == size(racket_methods), '', ', \')
             call file%put()
         end do
         call file%put('unset multiplot')
         call file%finish()
         call draw(options, 'racket')
-    end subroutine chart_racket
+    end subroutine draw_racket
 
 end module frb_chart_orbits

@@ -193,17 +193,18 @@ contains
         call file%put_lines([character(width) :: &
             'set multiplot', 'set logscale xy', 'set format x "10^{%T}"', &
             'set format y "10^{%T}"', &
-            'set yrange [1e-16:30]', 'set xrange [10:5e6]', 'set ytics 1e-16,1e2', &
+            'set yrange [1e-16:30]', 'set xrange [10:5e6]', 'set ytics 1e-16,1e2', 'set mytics 1', &
             'set xlabel "time spent to reach t = 10  [ns]" offset 0,0.4', &
-            'set ylabel "error of attitude  [rad]"', &
             'unset key', 'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0'])
         do b = 1, size(names)
             write (title, '(a,2(f5.3,a),f5.3,a)') ': I = (', bodies(1, b), ', ', bodies(2, b), ', ', &
                 bodies(3, b), ')'
             call file%put('set title "'//trim(names(b))//' body'//trim(title)//'" offset 0,-0.6')
-            write (file%line, '(a,f5.3,a,f5.3)') 'set origin ', merge(0.08, 0.58, mod(b, 2) == 1), ',', &
-                merge(0.56, 0.07, b < 3)
+            write (file%line, '(a,f5.3,a,f5.3)') 'set origin ', merge(0.08, 0.57, mod(b, 2) == 1), ',', &
+                merge(0.56, 0.06, b < 3)
             call file%put()
+            call file%put(either(mod(b, 2) == 1, 'set ylabel "error of attitude  [rad]" offset 2.5,0', &
+                                 'unset ylabel'))
             call file%put_lines([character(width) :: 'set size 0.40,0.40', 'plot \'])
             write (file%line, '(a,i0,a)') '  "work-precision-'//trim(names(b))//'.dat" index ', &
                 size(methods), &
@@ -222,7 +223,7 @@ contains
             'unset ylabel', 'unset title', 'unset grid', 'unset logscale', 'set xrange [0:1]', &
             'set yrange [0:1]', &
             'set key center center maxrows 12 samplen 2.2 spacing 1.1 Left reverse', 'plot \', &
-            '  NaN with lines lc rgb "#dddddd" lw 10 title "lower left envelope", \'])
+            '  NaN with lines lc rgb "#dddddd" lw 10 title "best of all methods", \'])
         do i = 1, size(methods)
             if (.not. drawn(methods(i))) cycle
             call file%put('  NaN'//style(methods(i))//either(i == size(methods), '', ', \'))
@@ -283,7 +284,7 @@ contains
         call open_script(options, 'growth', 900, 640, file)
         call file%put_lines([character(width) :: &
             'set logscale xy', 'set format x "10^{%T}"', 'set format y "10^{%T}"', &
-            'set xrange [0.8:1.2e6]', 'set yrange [1e-17:10]', 'set xlabel "number of steps to t = 16"', &
+            'set xrange [0.8:1.2e6]', 'set yrange [1e-17:10]', 'set mytics 1', 'set xlabel "number of steps to t = 16"', &
             'set ylabel "error of attitude, median of 9 bodies  [rad]"', &
             'set title "Cutting the same time into more steps"', &
             'set key outside right center vertical spacing 1.1 samplen 2.2 Left reverse', 'plot \', &

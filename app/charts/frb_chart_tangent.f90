@@ -284,7 +284,7 @@ contains
         end do
         call begin_legend(file, 'maxrows 2 samplen 2.2 spacing 1.3')
         do i = 1, rivals
-            write (label, '(a,f4.1,a)') ' (', cost(i + 1)/cost(1), ' times the step)'
+            write (label, '(a,f0.1,a)') ' (', cost(i + 1)/cost(1), ' times the step)'
             call file%put('  NaN with linespoints lw 2 pt 7 lc rgb '//trim(colours(i))//' title "'// &
                 trim(legend(i))//trim(label)//'", \')
         end do

@@ -5,7 +5,7 @@ program frb_charts
     use frb_chart_cost, only: chart_cost, chart_speed
     use frb_chart_failure, only: chart_failure
     use frb_chart_heavy_top, only: chart_heavy_top
-    use frb_chart_orbits, only: chart_orbits, chart_racket
+    use frb_chart_orbits, only: chart_orbits
     use frb_chart_output, only: settings, give_up, say
     use frb_chart_precision, only: chart_work_precision, chart_growth
     use frb_chart_ratios, only: chart_ratios
@@ -95,7 +95,6 @@ program frb_charts
             call chart_water(options)
         case ('orbits')
             call chart_orbits(options)
-            call chart_racket(options)
             call chart_torus(options)
         case ('agreement')
             call chart_agreement(options)

@@ -4,7 +4,7 @@
 !> `dipoles fail` makes a torque of the last rank NaN during the run: all ranks end with the same status.
 module frb_dipole_ranks
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
-    use frb, only: wp, group_scene, quat_conjugate, quat_rotate, status_ok
+    use frb, only: wp, group_scene, quat_rotate, quat_rotate_back, status_ok
     use mpi, only: mpi_comm_world, mpi_double_precision, mpi_integer, mpi_max, mpi_sum, mpi_in_place, &
         mpi_allgatherv, mpi_allreduce
     implicit none
@@ -84,8 +84,8 @@ contains
         call look_around(self, q)
         do i = 1, size(q, 2)
             associate (p => self%mine(:, i), e => self%field(:, i))
-                tau(:, i) = quat_rotate(quat_conjugate(q(:, i)), &
-                                        [p(2)*e(3) - p(3)*e(2), p(3)*e(1) - p(1)*e(3), p(1)*e(2) - p(2)*e(1)])
+                tau(:, i) = quat_rotate_back(q(:, i), [p(2)*e(3) - p(3)*e(2), p(3)*e(1) - p(1)*e(3), &
+                                                       p(1)*e(2) - p(2)*e(1)])
             end associate
         end do
         self%calls = self%calls + 1
