@@ -39,7 +39,7 @@ contains
         type(tally), intent(inout) :: t
         type(top_case) :: item
         type(extrapolation_report) :: report
-        real(wp) :: m(3), q(4), error(2), seen, m_ref(3), q_ref(4), h
+        real(wp) :: m(3), q(4), error(2), order_seen, m_ref(3), q_ref(4), h
         integer, parameter :: steps(2, 4) = reshape([15, 23, 12, 18, 26, 34, 16, 36], [2, 4])
         integer, parameter :: tops(4) = [2, 2, 3, 2]
         ! The tolerance chooses the sequences: 0 those for the last digits.
@@ -56,10 +56,11 @@ contains
                 error(i) = distance(m, q, item%m, item%q)
                 call t%equal('fixed-steps-are-as-many-as-asked-for', int(report%steps), steps(i, k))
             end do
-            seen = log(error(1)/error(2))/log(real(steps(2, k), wp)/steps(1, k))
-            if (k < 3) call t%close_to('order-fourteen-shows', seen, 14.0_wp, 1.0_wp)
-            if (k == 3) call t%ok('order-fourteen-is-kept-or-passed', seen > 13.0_wp)
-            if (k == 4) call t%close_to('order-twelve-shows-for-a-loose-tolerance', seen, 12.0_wp, 1.0_wp)
+            order_seen = log(error(1)/error(2))/log(real(steps(2, k), wp)/steps(1, k))
+            if (k < 3) call t%close_to('order-fourteen-shows', order_seen, 14.0_wp, 1.0_wp)
+            if (k == 3) call t%ok('order-fourteen-is-kept-or-passed', order_seen > 13.0_wp)
+            if (k == 4) call t%close_to('order-twelve-shows-for-a-loose-tolerance', order_seen, 12.0_wp, &
+                                        1.0_wp)
         end do
         do k = 1, 3
             item = known_top(k)
@@ -174,7 +175,7 @@ contains
     subroutine test_observers(t)
         type(tally), intent(inout) :: t
         type(top_case) :: item
-        type(recorder) :: seen
+        type(recorder) :: record
         type(extrapolation_report) :: report
         real(wp) :: m(3), q(4), m_alone(3), q_alone(4), time
         integer :: stat, n
@@ -185,22 +186,23 @@ contains
         m_alone = m
         q_alone = q
         call extrapolate(item%body, item%top, item%t, m_alone, q_alone, 1.0e-9_wp)
-        call extrapolate(item%body, item%top, item%t, m, q, 1.0e-9_wp, observer=seen, report=report)
-        n = seen%count
+        call extrapolate(item%body, item%top, item%t, m, q, 1.0e-9_wp, observer=record, report=report)
+        n = record%count
         call t%equal('an-observer-sees-the-start-and-every-step', n, int(report%steps) + 1)
         call t%at_most('an-observer-changes-nothing', distance(m, q, m_alone, q_alone), 0.0_wp)
-        call t%ok('steps-are-numbered-and-times-go-on', all(seen%step(2:n) == seen%step(1:n - 1) + 1) &
-                  .and. all(seen%t(2:n) > seen%t(1:n - 1)) .and. abs(seen%t(n) - item%t) <= 0.0_wp)
-        call t%at_most('the-last-state-shown-is-the-last', distance(m, q, seen%m(:, n), seen%q(:, n)), 0.0_wp)
+        call t%ok('steps-are-numbered-and-times-go-on', all(record%step(2:n) == record%step(1:n - 1) + 1) &
+                  .and. all(record%t(2:n) > record%t(1:n - 1)) .and. abs(record%t(n) - item%t) <= 0.0_wp)
+        call t%at_most('the-last-state-shown-is-the-last', &
+                       distance(m, q, record%m(:, n), record%q(:, n)), 0.0_wp)
         m = item%m0
         q = item%q0
-        seen%count = 0
-        seen%stop_at = 3
+        record%count = 0
+        record%stop_at = 3
         time = 0.0_wp
-        call extrapolate(item%body, item%top, item%t, m, q, 1.0e-9_wp, t=time, observer=seen, stat=stat)
+        call extrapolate(item%body, item%top, item%t, m, q, 1.0e-9_wp, t=time, observer=record, stat=stat)
         call t%equal('an-observer-can-stop', stat, status_stopped)
-        call t%ok('and-keeps-the-state-it-saw', seen%count == 4 .and. abs(time - seen%t(4)) <= 0.0_wp &
-                  .and. distance(m, q, seen%m(:, 4), seen%q(:, 4)) <= 0.0_wp)
+        call t%ok('and-keeps-the-state-it-saw', record%count == 4 .and. abs(time - record%t(4)) <= 0.0_wp &
+                  .and. distance(m, q, record%m(:, 4), record%q(:, 4)) <= 0.0_wp)
     end subroutine test_observers
 
     !> Many bodies: each moves as by itself, also when another one is refused.

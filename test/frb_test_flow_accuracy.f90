@@ -59,16 +59,16 @@ contains
         type(stream) :: random
         type(reference_case) :: it
         real(wp) :: moments(3), m0(3), h, state(7), score_m(each), score_q(each)
-        integer :: kind, i, j, count
+        integer :: edge, i, j, count
 
         random%state = 41
-        do kind = 1, 6
-            count = merge(size(once, 2), each, kind == 6)
+        do edge = 1, 6
+            count = merge(size(once, 2), each, edge == 6)
             do i = 1, count
                 moments = random%triangle()
                 m0 = random%direction()
                 h = sign(random%log_uniform(-2.0_wp, 1.0_wp), random%uniform(-1.0_wp, 1.0_wp))
-                select case (kind)
+                select case (edge)
                 case (1)
                     j = 1 + mod(i, 3)
                     m0 = m0*random%log_uniform(-12.0_wp, -0.5_wp)
@@ -93,7 +93,7 @@ contains
                 score_m(i) = score_momentum(it, state(1:3))
                 score_q(i) = score_attitude(it, state(4:7))
             end do
-            call t%at_most('taylor-agrees: '//trim(names(kind)), &
+            call t%at_most('taylor-agrees: '//trim(names(edge)), &
                            largest([score_m(:count), score_q(:count)]), flow_largest)
         end do
     end subroutine check_taylor

@@ -131,20 +131,20 @@ contains
         integer, parameter :: n = 100
         type(stream) :: random
         type(rigid_body) :: bodies(n)
-        real(wp) :: m_in(3, n), q_in(4, n), m(3, n), q(4, n), one(7), h
+        real(wp) :: m_in(3, n), q_in(4, n), m(3, n), q(4, n), alone(7), h
         logical :: bad(n), stays, goes_on
-        integer :: i, kind, stat, expected
+        integer :: i, form, stat, expected
 
-        do kind = 1, 6
+        do form = 1, 6
             expected = status_bad_attitude
             do i = 1, n
                 bodies(i) = rigid_body(random%triangle())
-                if (kind >= 4) bodies(i) = rigid_body(moments)
+                if (form >= 4) bodies(i) = rigid_body(moments)
                 m_in(:, i) = random%direction()
                 q_in(:, i) = q0
                 bad(i) = mod(i*i, 13) == 4
                 if (.not. bad(i)) cycle
-                select case (kind)
+                select case (form)
                 case (1)
                     bodies(i) = rigid_body([1.0_wp, 0.0_wp, 2.0_wp])
                     expected = status_bad_moments
@@ -163,7 +163,7 @@ contains
                 h = 10.0_wp**i
                 m = m_in
                 q = q_in
-                if (kind <= 3) then
+                if (form <= 3) then
                     call free_flow(bodies, h, m, q, stat)
                 else
                     call free_flow(bodies(1), h, m, q, stat)
@@ -171,8 +171,8 @@ contains
                 stays = stays .and. stat == expected
                 call compare()
             end do
-            call t%ok('bad-bodies-of-a-batch-stay-as-they-are: '//achar(48 + kind), stays)
-            call t%ok('good-bodies-of-a-batch-go-on: '//achar(48 + kind), goes_on)
+            call t%ok('bad-bodies-of-a-batch-stay-as-they-are: '//achar(48 + form), stays)
+            call t%ok('good-bodies-of-a-batch-go-on: '//achar(48 + form), goes_on)
         end do
         m = m_in
         q = spread(q0, 2, n)
@@ -191,10 +191,10 @@ contains
                 if (bad(j)) then
                     stays = stays .and. same(m(:, j), m_in(:, j)) .and. same(q(:, j), q_in(:, j))
                 else
-                    one = advanced(bodies(j)%moments(), m_in(:, j), h, q_in(:, j))
+                    alone = advanced(bodies(j)%moments(), m_in(:, j), h, q_in(:, j))
                     ! The angle turned is of size h.
                     goes_on = goes_on .and. &
-                        largest(abs(made_finite([m(:, j), q(:, j)]) - one)) <= 16*eps*(1 + h)
+                        largest(abs(made_finite([m(:, j), q(:, j)]) - alone)) <= 16*eps*(1 + h)
                 end if
             end do
         end subroutine compare

@@ -118,22 +118,22 @@ contains
             'different-bodies', 'different-bodies-own-times']
         real(wp) :: m(3, n), q(4, n), alone(3, n), mc(3, n), qc(4, n)
         logical :: bits, apart
-        integer :: kind, k, first, last, stat, bodies, times
+        integer :: form, k, first, last, stat, bodies, times
 
-        do kind = 1, 4
-            bodies = merge(1, n, kind <= 2)
-            times = merge(1, n, mod(kind, 2) == 1)
+        do form = 1, 4
+            bodies = merge(1, n, form <= 2)
+            times = merge(1, n, mod(form, 2) == 1)
             m = some%m
             q = some%q
             alone = m
-            if (kind == 1) call free_flow(some%body(1), some%h(1), m, q)
-            if (kind == 2) call free_flow(some%body(1), some%h, m, q)
-            if (kind == 3) call free_flow(some%body, some%h(1), m, q)
-            if (kind == 4) call free_flow(some%body, some%h, m, q)
-            if (kind == 1) call free_flow(some%body(1), some%h(1), alone)
-            if (kind == 2) call free_flow(some%body(1), some%h, alone)
-            if (kind == 3) call free_flow(some%body, some%h(1), alone)
-            if (kind == 4) call free_flow(some%body, some%h, alone)
+            if (form == 1) call free_flow(some%body(1), some%h(1), m, q)
+            if (form == 2) call free_flow(some%body(1), some%h, m, q)
+            if (form == 3) call free_flow(some%body, some%h(1), m, q)
+            if (form == 4) call free_flow(some%body, some%h, m, q)
+            if (form == 1) call free_flow(some%body(1), some%h(1), alone)
+            if (form == 2) call free_flow(some%body(1), some%h, alone)
+            if (form == 3) call free_flow(some%body, some%h(1), alone)
+            if (form == 4) call free_flow(some%body, some%h, alone)
             bits = .true.
             do k = 1, size(splits)
                 mc = some%m
@@ -145,15 +145,15 @@ contains
                 end do
                 bits = bits .and. same(mc, m) .and. same(qc, q)
             end do
-            call t%ok('columns-give-the-bits-of-rows: '//trim(names(kind)), bits)
+            call t%ok('columns-give-the-bits-of-rows: '//trim(names(form)), bits)
             ! Without attitude the momenta are the same to a unit in the last place of |m| = 1.
-            if (kind == 1 .or. kind == 4) then
+            if (form == 1 .or. form == 4) then
                 mc = some%m
                 call by_columns(some, bodies, times, 1, n, mc, stat)
                 apart = stat == status_ok .and. maxval(abs(mc - m)) <= eps
-                call t%ok('columns-of-momenta-alone: '//trim(names(kind)), apart)
+                call t%ok('columns-of-momenta-alone: '//trim(names(form)), apart)
             end if
-            call t%at_most('momenta-alone-to-a-unit: '//trim(names(kind)), largest([abs(alone - m)]), eps)
+            call t%at_most('momenta-alone-to-a-unit: '//trim(names(form)), largest([abs(alone - m)]), eps)
         end do
     end subroutine check_columns
 
@@ -233,23 +233,23 @@ contains
         type(sample), allocatable :: bad
         real(wp) :: m(3, n), q(4, n), good_m(3, n), good_q(4, n)
         logical :: right
-        integer :: kind, stat, i, expected
+        integer :: form, stat, i, expected
 
         good_m = some%m
         good_q = some%q
         call by_columns(some, n, n, 1, n, good_m, stat, good_q)
         right = .true.
-        do kind = 1, 4
+        do form = 1, 4
             bad = some
-            i = 40 + 17*kind
+            i = 40 + 17*form
             expected = status_bad_attitude
-            if (kind == 1) bad%q(:, i) = 0.0_wp
-            if (kind == 2) bad%m(3, i) = ieee_value(1.0_wp, ieee_quiet_nan)
-            if (kind == 3) bad%h(i) = ieee_value(1.0_wp, ieee_positive_inf)
-            if (kind == 4) bad%body(i) = rigid_body([1.0_wp, -1.0_wp, 1.0_wp])
-            if (kind == 2) expected = status_bad_momentum
-            if (kind == 3) expected = status_bad_time
-            if (kind == 4) expected = status_bad_moments
+            if (form == 1) bad%q(:, i) = 0.0_wp
+            if (form == 2) bad%m(3, i) = ieee_value(1.0_wp, ieee_quiet_nan)
+            if (form == 3) bad%h(i) = ieee_value(1.0_wp, ieee_positive_inf)
+            if (form == 4) bad%body(i) = rigid_body([1.0_wp, -1.0_wp, 1.0_wp])
+            if (form == 2) expected = status_bad_momentum
+            if (form == 3) expected = status_bad_time
+            if (form == 4) expected = status_bad_moments
             m = bad%m
             q = bad%q
             call by_columns(bad, n, n, 1, n, m, stat, q)

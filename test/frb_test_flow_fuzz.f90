@@ -41,7 +41,7 @@ contains
         integer, parameter :: width = 40
         type(stream) :: random
         character(20) :: seed
-        real(wp) :: moments(3), m(3), h, there(7), back(7), orbit(4), error, batch, sensitive, unit, one(7)
+        real(wp) :: moments(3), m(3), h, there(7), back(7), orbit(4), error, batch, sensitive, unit, alone(7)
         real(wp) :: many_m(3, width), many_q(4, width), many_moments(3, width), many_m0(3, width)
         type(rigid_body) :: bodies(width)
         logical :: finite
@@ -84,12 +84,12 @@ contains
             call free_flow(bodies, h, many_m, many_q)
             do j = 1, width
                 there = made_finite([many_m(:, j), many_q(:, j)])
-                one = advanced(many_moments(:, j), many_m0(:, j), h)
+                alone = advanced(many_moments(:, j), many_m0(:, j), h)
                 sensitive = worst_of(sensitive, bounded(defect(many_moments(:, j), many_m0(:, j), there), &
                                                     many_moments(:, j), many_m0(:, j)))
                 unit = sensitivity(many_moments(:, j), many_m0(:, j), h)
-                if (unit < most_sensitive) batch = worst_of(batch, [norm2(there(4:7) - one(4:7))/unit, &
-                                                       norm3(there(1:3) - one(1:3))/norm3(one(1:3))/unit])
+                if (unit < most_sensitive) batch = worst_of(batch, [norm2(there(4:7) - alone(4:7))/unit, &
+                                                       norm3(there(1:3) - alone(1:3))/norm3(alone(1:3))/unit])
             end do
         end do
         call t%ok('fuzz-stays-finite', finite)
@@ -144,10 +144,10 @@ contains
         real(wp), intent(in) :: moments(3), m(3), h
         real(wp) :: unit
         real(wp), parameter :: beside = 1.0e-7_wp
-        real(wp) :: one(7), other(7), moved_m(3), moved(3)
+        real(wp) :: alone(7), other(7), moved_m(3), moved(3)
         integer :: i, axis
 
-        one = advanced(moments, m, h)
+        alone = advanced(moments, m, h)
         unit = 2 + abs(h)*norm3(m)/minval(moments)
         do i = 1, 6
             axis = 1 + mod(i, 3)
@@ -159,8 +159,8 @@ contains
                 moved(axis) = moved(axis)*(1 + beside)
             end if
             other = advanced(moved, moved_m, h)
-            unit = max(unit, norm3(other(1:3) - one(1:3))/(beside*norm3(m)), &
-                       norm2(other(4:7) - one(4:7))/beside)
+            unit = max(unit, norm3(other(1:3) - alone(1:3))/(beside*norm3(m)), &
+                       norm2(other(4:7) - alone(4:7))/beside)
         end do
         unit = 2*unit*unit_roundoff
     end function sensitivity

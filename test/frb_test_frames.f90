@@ -212,7 +212,7 @@ contains
         type(tally), intent(inout) :: t
         real(wp), parameter :: friction(3) = [0.5_wp, 1.0_wp, 4.0_wp]
         type(rigid_body) :: body, many(n)
-        real(wp) :: q(4, n), noise(3, n), m(3, n), one(3, n)
+        real(wp) :: q(4, n), noise(3, n), m(3, n), singly(3, n)
         integer :: i
 
         call samples(q, noise)
@@ -222,23 +222,23 @@ contains
         end do
         many(7) = rigid_body(tensor)
         m = q(1:3, :)
-        one = m
+        singly = m
         call langevin_kick(body, friction, 0.7_wp, 0.2_wp, noise, m)
         do i = 1, n
-            call langevin_kick(body, friction, 0.7_wp, 0.2_wp, noise(:, i), one(:, i))
+            call langevin_kick(body, friction, 0.7_wp, 0.2_wp, noise(:, i), singly(:, i))
         end do
-        call t%close_to('alike-bodies-are-kicked-as-one-by-one', [m], [one], 0.0_wp)
+        call t%close_to('alike-bodies-are-kicked-as-one-by-one', [m], [singly], 0.0_wp)
         call langevin_kick(many, friction, 0.7_wp, 0.2_wp, noise, m)
         do i = 1, n
-            call langevin_kick(many(i), friction, 0.7_wp, 0.2_wp, noise(:, i), one(:, i))
+            call langevin_kick(many(i), friction, 0.7_wp, 0.2_wp, noise(:, i), singly(:, i))
         end do
-        call t%close_to('bodies-are-kicked-as-one-by-one', [m], [one], 0.0_wp)
+        call t%close_to('bodies-are-kicked-as-one-by-one', [m], [singly], 0.0_wp)
         call langevin_kick(many, 0.3_wp, 0.7_wp, 0.2_wp, noise, m)
-        call langevin_kick(many, [0.3_wp, 0.3_wp, 0.3_wp], 0.7_wp, 0.2_wp, noise, one)
-        call t%close_to('one-friction-is-that-of-all-axes', [m], [one], 0.0_wp)
+        call langevin_kick(many, [0.3_wp, 0.3_wp, 0.3_wp], 0.7_wp, 0.2_wp, noise, singly)
+        call t%close_to('one-friction-is-that-of-all-axes', [m], [singly], 0.0_wp)
         call langevin_kick(body, 0.3_wp, 0.7_wp, 0.2_wp, noise, m)
-        call langevin_kick(body, [0.3_wp, 0.3_wp, 0.3_wp], 0.7_wp, 0.2_wp, noise, one)
-        call t%close_to('so-it-is-for-alike-bodies', [m], [one], 0.0_wp)
+        call langevin_kick(body, [0.3_wp, 0.3_wp, 0.3_wp], 0.7_wp, 0.2_wp, noise, singly)
+        call t%close_to('so-it-is-for-alike-bodies', [m], [singly], 0.0_wp)
     end subroutine test_kick_shapes
 
     !> Each way a call can be wrong.

@@ -208,7 +208,7 @@ contains
         character(*), intent(in) :: name
         integer, parameter :: points = 400
         type(free_motion) :: motion
-        real(wp) :: m(3), q(4), pole(3), zero(3), ninety(3), long(3), now, before, way
+        real(wp) :: m(3), q(4), pole(3), zero(3), ninety(3), long(3), angle, last_angle, turned
         integer :: i
 
         motion = free_motion(rigid_body(moments), m0, start)
@@ -218,20 +218,20 @@ contains
         zero = quat_rotate(start, long)
         zero = zero - dot_product(zero, pole)*pole
         ninety = cross(pole, zero)
-        way = 0.0_wp
-        before = 0.0_wp
+        turned = 0.0_wp
+        last_angle = 0.0_wp
         do i = 1, points
             call motion%at(motion%period()*i/points, m, q)
             associate (axis => quat_rotate(q, long))
-                now = atan2(dot_product(axis, ninety), dot_product(axis, zero))
+                angle = atan2(dot_product(axis, ninety), dot_product(axis, zero))
             end associate
-            way = way + modulo(now - before + pi, two_pi) - pi
-            before = now
+            turned = turned + modulo(angle - last_angle + pi, two_pi) - pi
+            last_angle = angle
         end do
-        call t%close_to('precession-is-the-way-of-the-long-axis-'//name, motion%precession(), way, &
+        call t%close_to('precession-is-the-way-of-the-long-axis-'//name, motion%precession(), turned, &
                         64*eps*points)
         call t%close_to('precession-period-is-the-mean-'//name, motion%precession_period(), &
-                        two_pi*motion%period()/way, 64*eps*points*motion%precession_period())
+                        two_pi*motion%period()/turned, 64*eps*points*motion%precession_period())
     end subroutine check_way
 
     !> Toutatis: moments and rates of 1992-11-09 after Takahashi, Busch and Scheeres (2013), periods of Hudson

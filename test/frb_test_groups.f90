@@ -109,7 +109,7 @@ contains
         type(rigid_body) :: body(n)
         type(dipoles) :: scene
         type(splitting_scheme) :: scheme
-        type(group_recorder) :: seen
+        type(group_recorder) :: record
         real(wp) :: m(3, n), q(4, n), m_fine(3, n), q_fine(4, n), m_start(3, n), q_start(4, n)
         real(wp) :: energy, error(2)
         integer :: i, k
@@ -142,12 +142,12 @@ contains
                        largest([abs(m - m_start), abs(q - q_start)]), 2048*eps)
         m = m_start
         q = q_start
-        call integrate(body, splitting_scheme('srkn14'), scene, 0.01_wp, 300, m, q, seen, every=100)
+        call integrate(body, splitting_scheme('srkn14'), scene, 0.01_wp, 300, m, q, record, every=100)
         call t%close_to('watching-a-group-does-not-change-its-run', [m, q], [m_fine, q_fine], 0.0_wp)
         call t%ok('group-observer-is-called-at-the-start-and-every-100-steps', &
-                  seen%count == 4 .and. seen%step == 300)
-        call t%close_to('group-observer-sees-the-end-as-it-is-returned', [seen%m, seen%q], [m, q], 0.0_wp)
-        call t%close_to('group-observer-is-told-the-time', seen%t, 3.0_wp, 4*eps)
+                  record%count == 4 .and. record%step == 300)
+        call t%close_to('group-observer-sees-the-end-as-it-is-returned', [record%m, record%q], [m, q], 0.0_wp)
+        call t%close_to('group-observer-is-told-the-time', record%t, 3.0_wp, 4*eps)
         ! The same steps in a compensated run, with and without observer, and back.
         m = m_start
         q = q_start
@@ -158,12 +158,12 @@ contains
         q_fine = q
         m = m_start
         q = q_start
-        call integrate(body, splitting_scheme('srkn14'), scene, 0.01_wp, 300, m, q, seen, every=100, &
+        call integrate(body, splitting_scheme('srkn14'), scene, 0.01_wp, 300, m, q, record, every=100, &
                        compensated=.true.)
         call t%close_to('watching-a-compensated-group-does-not-change-its-run', [m, q], &
                         [m_fine, q_fine], 0.0_wp)
         call t%close_to('group-observer-sees-the-end-of-a-compensated-run-as-it-is-returned', &
-                        [seen%m, seen%q], [m, q], 0.0_wp)
+                        [record%m, record%q], [m, q], 0.0_wp)
         call integrate(body, splitting_scheme('srkn14'), scene, -0.01_wp, 300, m, q, compensated=.true.)
         call t%at_most('a-compensated-group-runs-back-to-its-start', &
                        largest([abs(m - m_start), abs(q - q_start)]), 8*eps)

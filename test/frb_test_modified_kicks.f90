@@ -118,7 +118,7 @@ contains
         type(top_case) :: item
         type(splitting_scheme) :: scheme
         type(bare_top) :: bare
-        real(wp) :: m(3), q(4), error(2), seen
+        real(wp) :: m(3), q(4), error(2), order_seen
         character(:), allocatable :: label
         character(1) :: digit
         integer :: i, n
@@ -137,7 +137,7 @@ contains
             end if
             error(i) = distance(m, q, item%m, item%q)
         end do
-        seen = log(error(1)/error(2))/log(real(many, wp)/few)
+        order_seen = log(error(1)/error(2))/log(real(many, wp)/few)
         write (digit, '(i0)') number
         label = name//'-with-'
         if (own) then
@@ -147,7 +147,7 @@ contains
         else
             label = label//'displaced-torques'
         end if
-        call t%close_to(label//'-shows-its-order-on-top-'//digit, seen, real(order, wp), 0.2_wp)
+        call t%close_to(label//'-shows-its-order-on-top-'//digit, order_seen, real(order, wp), 0.2_wp)
         call t%ok(label//'-error-falls-by-two-decades-on-top-'//digit, error(1) >= 100*error(2))
     end subroutine check_order
 
@@ -186,7 +186,7 @@ contains
         type(tally), intent(inout) :: t
         type(dipoles) :: scene
         type(rigid_body) :: body
-        real(wp) :: m0(3, 3), q0(4, 3), m(3, 3), q(4, 3), m_ref(3, 3), q_ref(4, 3), error(2), seen
+        real(wp) :: m0(3, 3), q0(4, 3), m(3, 3), q(4, 3), m_ref(3, 3), q_ref(4, 3), error(2), order_seen
         integer, parameter :: steps(2) = [15, 35]
         integer :: i, k
 
@@ -207,12 +207,13 @@ contains
                                5.0_wp/steps(i), steps(i), m, q, compensated=.true.)
                 error(i) = norm2(m - m_ref) + norm2(q - q_ref)
             end do
-            seen = log(error(1)/error(2))/log(real(steps(2), wp)/steps(1))
+            order_seen = log(error(1)/error(2))/log(real(steps(2), wp)/steps(1))
             select case (k)
             case (3)
-                call t%close_to('a-group-with-one-displaced-torque-shows-order-four', seen, 4.0_wp, 0.4_wp)
+                call t%close_to('a-group-with-one-displaced-torque-shows-order-four', order_seen, 4.0_wp, &
+                                0.4_wp)
             case default
-                call t%close_to('a-group-with-displaced-torques-shows-order-six', seen, 6.0_wp, 0.3_wp)
+                call t%close_to('a-group-with-displaced-torques-shows-order-six', order_seen, 6.0_wp, 0.3_wp)
             end select
         end do
     end subroutine test_group
@@ -222,7 +223,7 @@ contains
         type(tally), intent(inout) :: t
         type(turning_top) :: top
         type(rigid_body) :: body
-        real(wp) :: m(3), q(4), m_ref(3), q_ref(4), error(2), seen, time
+        real(wp) :: m(3), q(4), m_ref(3), q_ref(4), error(2), order_seen, time
         integer, parameter :: steps(2) = [20, 46]
         integer :: i
 
@@ -239,8 +240,8 @@ contains
                            compensated=.true.)
             error(i) = distance(m, q, m_ref, q_ref)
         end do
-        seen = log(error(1)/error(2))/log(real(steps(2), wp)/steps(1))
-        call t%close_to('fg6a-keeps-its-order-where-the-force-turns', seen, 6.0_wp, 0.3_wp)
+        order_seen = log(error(1)/error(2))/log(real(steps(2), wp)/steps(1))
+        call t%close_to('fg6a-keeps-its-order-where-the-force-turns', order_seen, 6.0_wp, 0.3_wp)
     end subroutine test_time
 
     !> A loop by hand, after the recipe of the plan, gives the result of `integrate`.
@@ -295,7 +296,7 @@ contains
         real(wp), parameter :: sizes(2) = [0.25_wp, 0.25_wp]
         character(4), parameter :: names(2) = ['fg6a', 'fg6b']
         type(top_case) :: item
-        type(recorder) :: seen
+        type(recorder) :: record
         real(wp) :: m(3), q(4), energy(1001), trend, worst, v(1001)
         integer :: i, j, k, steps
 
@@ -307,11 +308,11 @@ contains
             do k = 0, 3
                 m = item%m0*(1 + 0.001_wp*k)
                 q = item%q0
-                seen%count = 0
-                call integrate(item%body, splitting_scheme(names(j)), item%top, sizes(j), steps, m, q, seen, &
-                               every=steps/1000)
+                record%count = 0
+                call integrate(item%body, splitting_scheme(names(j)), item%top, sizes(j), steps, m, q, &
+                               record, every=steps/1000)
                 do i = 1, 1001
-                    energy(i) = total_energy(item%body, item%top, seen%t(i), seen%m(:, i), seen%q(:, i))
+                    energy(i) = total_energy(item%body, item%top, record%t(i), record%m(:, i), record%q(:, i))
                 end do
                 v = energy - energy(1)
                 worst = worst_of(worst, abs(v))

@@ -124,7 +124,7 @@ contains
         type(shared_top) :: scene
         type(shared_dipoles) :: group
         type(rigid_body) :: body(n)
-        type(recorder) :: seen
+        type(recorder) :: record
         real(wp) :: m(3), q(4), time, ms(3, n), qs(4, n), ms_start(3, n), qs_start(4, n)
         integer :: i, stat, calls, ended
         logical :: good
@@ -134,7 +134,7 @@ contains
         scene = shared_top(top=item%top)
         m = item%m0
         q = item%q0
-        call integrate(item%body, scheme, scene, 0.05_wp, 4, m, q, seen)
+        call integrate(item%body, scheme, scene, 0.05_wp, 4, m, q, record)
         calls = scene%agreed
         ! At the start, after each torque, at the end of each step, after each state shown.
         call t%equal('the-hook-is-asked-wherever-a-run-may-end', calls, 1 + 4*14 + 4 + 5)
@@ -144,7 +144,7 @@ contains
             m = item%m0
             q = item%q0
             time = 0.0_wp
-            call integrate(item%body, scheme, scene, 0.05_wp, 4, m, q, seen, t=time, stat=stat)
+            call integrate(item%body, scheme, scene, 0.05_wp, 4, m, q, record, t=time, stat=stat)
             good = good .and. stat == own_code .and. scene%agreed == i
         end do
         call t%ok('a-run-ends-where-another-process-refuses', good)
@@ -156,8 +156,8 @@ contains
         call t%ok('the-hook-hears-of-refused-input', scene%last_code == status_bad_time &
                   .and. scene%agreed == 1)
         scene = shared_top(top=item%top)
-        seen%stop_at = 1
-        call integrate(item%body, scheme, scene, 0.05_wp, 4, m, q, seen, stat=stat)
+        record%stop_at = 1
+        call integrate(item%body, scheme, scene, 0.05_wp, 4, m, q, record, stat=stat)
         call t%equal('the-hook-hears-of-an-observer-that-stops', scene%last_code, status_stopped)
 
         call start_of_group(body, ms_start, qs_start)
@@ -183,7 +183,7 @@ contains
         type(tally), intent(inout) :: t
         type(top_case) :: item
         type(splitting_scheme) :: scheme
-        type(recorder) :: seen
+        type(recorder) :: record
         type(shared_top) :: scene
         real(wp) :: m(3), q(4), m_joined(3), q_joined(4), time, worst(3)
         integer :: k, stat, done
@@ -201,10 +201,10 @@ contains
             worst(1) = worst_of(worst(1), distance(m, q, m_joined, q_joined))
             m_joined = item%m0
             q_joined = item%q0
-            seen%count = 0
-            call integrate(item%body, scheme, item%top, 0.05_wp, 40, m_joined, q_joined, seen, every=8, &
+            record%count = 0
+            call integrate(item%body, scheme, item%top, 0.05_wp, 40, m_joined, q_joined, record, every=8, &
                            joined=.true.)
-            worst(2) = worst_of(worst(2), distance(m, q, seen%m(:, 6), seen%q(:, 6)))
+            worst(2) = worst_of(worst(2), distance(m, q, record%m(:, 6), record%q(:, 6)))
             ! A joined run that a refusal ends has made its last drift: the state is that of a whole step.
             scene = shared_top(top=item%top, refuse_at=37)
             m_joined = item%m0

@@ -35,7 +35,7 @@ contains
         type(tally), intent(inout) :: t
         type(top_case) :: item
         type(splitting_scheme) :: scheme
-        type(recorder) :: seen
+        type(recorder) :: record
         type(group_recorder) :: group_seen
         type(dipoles) :: scene
         type(rigid_body) :: body(n)
@@ -50,26 +50,26 @@ contains
             m_short = m
             q_short = q
             time = 2.0_wp
-            seen%count = 0
-            seen%stop_at = 14
-            call integrate(item%body, scheme, item%top, 0.05_wp, 1000000000000_int64, m, q, seen, every=7, &
+            record%count = 0
+            record%stop_at = 14
+            call integrate(item%body, scheme, item%top, 0.05_wp, 1000000000000_int64, m, q, record, every=7, &
                            t=time, stat=stat)
             call integrate(item%body, scheme, item%top, 0.05_wp, 14, m_short, q_short)
             call t%ok('an-observer-ends-a-run-with-the-state-it-sees', stat == status_stopped &
-                      .and. seen%count == 3 .and. all(abs([m - m_short, m - seen%m(:, 3)]) <= 0.0_wp) &
-                      .and. all(abs([q - q_short, q - seen%q(:, 3)]) <= 0.0_wp) &
-                      .and. abs(time - seen%t(3)) <= 0.0_wp .and. abs(time - 2.7_wp) <= 2*eps)
+                      .and. record%count == 3 .and. all(abs([m - m_short, m - record%m(:, 3)]) <= 0.0_wp) &
+                      .and. all(abs([q - q_short, q - record%q(:, 3)]) <= 0.0_wp) &
+                      .and. abs(time - record%t(3)) <= 0.0_wp .and. abs(time - 2.7_wp) <= 2*eps)
         end do
-        seen%count = 0
-        seen%stop_at = 0
+        record%count = 0
+        record%stop_at = 0
         m = item%m0
         q = item%q0
-        call integrate(item%body, scheme, item%top, 0.05_wp, 10, m, q, seen, stat=stat)
-        call t%ok('before-the-first-step-if-it-likes', stat == status_stopped .and. seen%count == 1 &
+        call integrate(item%body, scheme, item%top, 0.05_wp, 10, m, q, record, stat=stat)
+        call t%ok('before-the-first-step-if-it-likes', stat == status_stopped .and. record%count == 1 &
                   .and. all(abs(m - item%m0) <= 0.0_wp))
-        seen%stop_at = 3
-        call integrate(item%body, scheme, item%top, 0.05_wp, 10, m, q, seen)
-        call t%equal('without-stat-a-stopped-run-returns', seen%count, 5)
+        record%stop_at = 3
+        call integrate(item%body, scheme, item%top, 0.05_wp, 10, m, q, record)
+        call t%equal('without-stat-a-stopped-run-returns', record%count, 5)
         call start_of_group(body, ms, qs)
         group_seen%stop_at = 4
         call integrate(body, scheme, scene, 0.05_wp, 10, ms, qs, group_seen, every=2, stat=stat)

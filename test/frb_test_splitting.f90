@@ -123,7 +123,7 @@ contains
         logical, intent(in), optional :: compensated
         type(top_case) :: item
         type(splitting_scheme) :: scheme
-        real(wp) :: m(3), q(4), error(2), seen
+        real(wp) :: m(3), q(4), error(2), order_seen
         character(1) :: digit
         integer :: i, n
 
@@ -136,9 +136,9 @@ contains
             call integrate(item%body, scheme, item%top, item%t/n, n, m, q, compensated=compensated)
             error(i) = distance(m, q, item%m, item%q)
         end do
-        seen = log(error(1)/error(2))/log(real(many, wp)/few)
+        order_seen = log(error(1)/error(2))/log(real(many, wp)/few)
         write (digit, '(i0)') number
-        call t%close_to(name//'-shows-its-order-on-top-'//digit, seen, real(order, wp), 0.2_wp)
+        call t%close_to(name//'-shows-its-order-on-top-'//digit, order_seen, real(order, wp), 0.2_wp)
         call t%ok(name//'-error-falls-by-two-decades-on-top-'//digit, error(1) >= 100*error(2))
     end subroutine check_order
 
@@ -147,7 +147,7 @@ contains
         type(tally), intent(inout) :: t
         type(top_case) :: item
         type(splitting_scheme) :: scheme
-        type(recorder) :: seen
+        type(recorder) :: record
         type(invariant_monitor) :: monitor
         real(wp) :: m(3), q(4), energy(1001), worst, trend
         integer :: stat, i, k
@@ -157,15 +157,15 @@ contains
         scheme = splitting_scheme('srkn14')
         m = item%m0
         q = item%q0
-        call integrate(item%body, scheme, item%top, 0.5_wp, 100000, m, q, seen, every=100, stat=stat)
+        call integrate(item%body, scheme, item%top, 0.5_wp, 100000, m, q, record, every=100, stat=stat)
         call t%equal('papers-run-comes-to-its-end', stat, status_ok)
-        call t%equal('observer-is-called-at-the-start-and-every-100-steps', seen%count, 1001)
+        call t%equal('observer-is-called-at-the-start-and-every-100-steps', record%count, 1001)
         monitor%body = item%body
         allocate (monitor%scene, source=item%top)
         monitor%axis = item%top%force/sqrt(sum(item%top%force**2))
-        do i = 1, seen%count
-            energy(i) = total_energy(item%body, item%top, seen%t(i), seen%m(:, i), seen%q(:, i))
-            call monitor%observe(seen%step(i), seen%t(i), seen%m(:, i), seen%q(:, i), stop_here)
+        do i = 1, record%count
+            energy(i) = total_energy(item%body, item%top, record%t(i), record%m(:, i), record%q(:, i))
+            call monitor%observe(record%step(i), record%t(i), record%m(:, i), record%q(:, i), stop_here)
         end do
         worst = largest(abs(energy - energy(1)))
         call t%at_most('energy-of-the-papers-top-stays-within-1e-13', worst, top_energy)
@@ -178,17 +178,19 @@ contains
         do k = 1, 3
             m = item%m0*(1 + 0.001_wp*k)
             q = item%q0
-            seen%count = 0
-            call integrate(item%body, scheme, item%top, 0.5_wp, 100000, m, q, seen, every=100, stat=stat)
-            energy = [(total_energy(item%body, item%top, seen%t(i), seen%m(:, i), seen%q(:, i)), i=1, 1001)]
+            record%count = 0
+            call integrate(item%body, scheme, item%top, 0.5_wp, 100000, m, q, record, every=100, stat=stat)
+            energy = [(total_energy(item%body, item%top, record%t(i), record%m(:, i), record%q(:, i)), &
+                       i=1, 1001)]
             trend = trend + fitted_change(energy)
         end do
         call t%at_most('energy-error-has-no-trend', abs(trend)/4, 4.0e-14_wp)
         m = item%m0
         q = item%q0
-        seen%count = 0
-        call integrate(item%body, scheme, item%top, 0.5_wp, 100000, m, q, seen, every=100, compensated=.true.)
-        energy = [(total_energy(item%body, item%top, seen%t(i), seen%m(:, i), seen%q(:, i)), i=1, 1001)]
+        record%count = 0
+        call integrate(item%body, scheme, item%top, 0.5_wp, 100000, m, q, record, every=100, &
+                       compensated=.true.)
+        energy = [(total_energy(item%body, item%top, record%t(i), record%m(:, i), record%q(:, i)), i=1, 1001)]
         call t%at_most('compensated-energy-of-the-papers-top-stays-within-5e-14', &
                        largest(abs(energy - energy(1))), 5.0e-14_wp)
         call t%at_most('compensated-energy-error-has-no-trend', abs(fitted_change(energy)), 4.0e-15_wp)
@@ -278,7 +280,7 @@ contains
         type(top_case) :: item
         type(splitting_scheme) :: scheme
         type(invariant_monitor) :: monitor
-        type(recorder) :: seen
+        type(recorder) :: record
         type(plain_drift) :: drift
         real(wp) :: m(3), q(4), m_seen(3), q_seen(4)
         integer :: k
@@ -303,13 +305,13 @@ contains
                            distance(m, q, item%m, item%q), 32*eps)
             m_seen = item%m0
             q_seen = item%q0
-            seen%count = 0
-            call integrate(item%body, scheme, item%top, item%t/2000, 2000, m_seen, q_seen, seen, every=500, &
-                           drift=drift, compensated=.true.)
+            record%count = 0
+            call integrate(item%body, scheme, item%top, item%t/2000, 2000, m_seen, q_seen, record, &
+                           every=500, drift=drift, compensated=.true.)
             call t%at_most('watching-a-compensated-run-does-not-change-it', &
                            distance(m_seen, q_seen, m, q), 0.0_wp)
             call t%at_most('observer-sees-the-end-of-a-compensated-run-as-it-is-returned', &
-                           distance(seen%m(:, 5), seen%q(:, 5), m, q), 0.0_wp)
+                           distance(record%m(:, 5), record%q(:, 5), m, q), 0.0_wp)
         end do
     end subroutine test_compensated
 

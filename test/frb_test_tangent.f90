@@ -77,7 +77,7 @@ contains
         character(*), intent(in) :: path, label
         integer, parameter :: n = 70    ! whole blocks and six more bodies
         type(tangent_case), allocatable :: cases(:)
-        real(wp) :: m(3, n), q(4, n), transition(6, 6, n), m_one(3), q_one(4), one(6, 6), worst(2), apart, &
+        real(wp) :: m(3, n), q(4, n), transition(6, 6, n), m_one(3), q_one(4), alone(6, 6), worst(2), apart, &
             moved
         real(wp), allocatable :: score(:, :)
         integer :: i, j, lane, k
@@ -98,16 +98,16 @@ contains
                     q(:, j) = no_turn
                 end do
                 call flow_tangent(cases(i)%body, cases(i)%h, m, q, transition)
-                if (k == 1) one = transition(:, :, lane)
+                if (k == 1) alone = transition(:, :, lane)
             end do
-            if (norm2(one) < 1.0e100_wp) moved = worst_of(moved, [abs(transition(:, :, lane) - one)])
+            if (norm2(alone) < 1.0e100_wp) moved = worst_of(moved, [abs(transition(:, :, lane) - alone)])
             score(i, 1) = score_matrix(transition(1:3, 1:3, lane), cases(i)%jacobian, cases(i)%sensitivity(1))
             score(i, 2) = score_matrix(transition(4:6, 1:3, lane), cases(i)%turns, cases(i)%sensitivity(2))
             if (abs(cases(i)%h) <= 0.0_wp) score(i, 2) = largest([abs(transition(4:6, 1:3, lane))])
             m_one = cases(i)%m0
             q_one = no_turn
-            call flow_tangent(cases(i)%body, cases(i)%h, m_one, q_one, one)
-            apart = worst_of(apart, [norm2(transition(4:6, 4:6, lane) - one(4:6, 4:6)), &
+            call flow_tangent(cases(i)%body, cases(i)%h, m_one, q_one, alone)
+            apart = worst_of(apart, [norm2(transition(4:6, 4:6, lane) - alone(4:6, 4:6)), &
                                      norm2(q(:, lane) - q_one), abs(transition(1:3, 4:6, lane))])
         end do
         call ieee_set_halting_mode(ieee_overflow, halting)

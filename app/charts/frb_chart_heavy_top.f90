@@ -119,7 +119,8 @@ contains
         high = (340.0_wp*spans)/(160 + 340*spans)
         call file%put_lines([character(width) :: 'set multiplot', 'set logscale xy', &
             'set format x "10^{%T}"', 'set format y "10^{%T}"', 'set yrange [1e-15:10]', &
-            'set ytics 1e-15,1e3', 'set mytics 1', 'unset key', 'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0'])
+            'set ytics 1e-15,1e3', 'set mytics 1', 'unset key', &
+            'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0'])
         do s = 1, spans
             write (digits, '(i0)') durations(s)
             do column = 1, 2
@@ -234,7 +235,7 @@ contains
         type(top_at_start) :: moving
         type(rigid_body) :: body
         type(heavy_top) :: scene
-        real(wp) :: m(3), q(4), energy, worst, now, next, part, torques
+        real(wp) :: m(3), q(4), energy, worst, time, end_time, part, torques
         integer :: k
 
         body = rigid_body(top%moments)
@@ -243,19 +244,19 @@ contains
         call file%put('# '//name_of(which))
         moving = top
         worst = 1.0e-17_wp
-        now = 0.0_wp
+        time = 0.0_wp
         seconds = 0.0_wp
         do k = 1, samples
-            next = max(longest**(real(k, wp)/samples), now + 1)
+            end_time = max(longest**(real(k, wp)/samples), time + 1)
             ! Whole steps of 4, which all steps divide.
-            next = now + 4*ceiling((next - now)/4)
-            call run_solver(which, moving, next - now, setting, 1, m, q, part, torques)
-            now = next
+            end_time = time + 4*ceiling((end_time - time)/4)
+            call run_solver(which, moving, end_time - time, setting, 1, m, q, part, torques)
+            time = end_time
             seconds = seconds + part
             moving%m0 = m
             moving%q0 = q
-            worst = max(worst, abs(total_energy(body, scene, now, m, q) - energy))
-            write (file%line, '(2es13.5)') now, worst
+            worst = max(worst, abs(total_energy(body, scene, time, m, q) - energy))
+            write (file%line, '(2es13.5)') time, worst
             call file%put()
         end do
         write (file%line, '(a,es11.3)') '# time spent [s]:', seconds

@@ -12,7 +12,7 @@ module frb_chart_solvers
     private
 
     public :: solver, top_at_start, all_solvers, name_of, setting_of, run_solver, settings_of_solver
-    public :: start_q, one_top
+    public :: start_q, one_top, papers_top
 
     integer, parameter :: settings_of_solver = 9
     real(wp), parameter :: start_q(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
@@ -59,14 +59,20 @@ contains
             top = top_at_start('strong', 'Hairer-Vilmart top (0.6, 0.8, 1)', [0.6_wp, 0.8_wp, 1.0_wp], &
                                [0.0_wp, 0.0_wp, 1.0_wp], [1.8_wp, 0.4_wp, -0.9_wp], 0.5_wp)
         else
-            top = top_at_start('weak', 'the paper''s top, |V| = 0.001', &
-                               [1.0_wp, 1.0126869887825154_wp, 3.3062374224730378_wp], &
-                               [9.5586303547238536e-5_wp, 4.8777318247201465e-4_wp, &
-                                -8.6772148817192390e-4_wp], &
-                               [-0.34790957088547336_wp, -0.19822914599675923_wp, -0.91633189192763642_wp], &
-                               4.0_wp)
+            top = papers_top()
         end if
     end function one_top
+
+    !> The paper's heavy top, section 4.3.
+    pure function papers_top() result(top)
+        type(top_at_start) :: top
+
+        top = top_at_start('weak', 'the paper''s top, |V| = 0.001', &
+                           [1.0_wp, 1.0126869887825154_wp, 3.3062374224730378_wp], &
+                           [9.5586303547238536e-5_wp, 4.8777318247201465e-4_wp, -8.6772148817192390e-4_wp], &
+                           [-0.34790957088547336_wp, -0.19822914599675923_wp, -0.91633189192763642_wp], &
+                           4.0_wp)
+    end function papers_top
 
     function all_solvers() result(solvers)
         type(solver), allocatable :: solvers(:)

@@ -5,6 +5,7 @@ module frb_chart_torque
         integrate, scheme_names, splitting_plan, splitting_scheme, status_ok, total_energy
     use frb_chart_dipoles, only: cost_of_dipoles, row
     use frb_chart_output, only: chart_file, settings, open_table, progress
+    use frb_chart_solvers, only: top_at_start, papers_top
     use frb_chart_timing, only: clock
     use frb_dmv, only: dmv_body, new_dmv_body, dmv_steps
     use, intrinsic :: iso_fortran_env, only: int64
@@ -14,16 +15,16 @@ module frb_chart_torque
     public :: chart_torque
 
     !> A heavy top and its start.
-    type :: top_at_start
+    type :: placed_top
         character(10) :: name = ''
         type(rigid_body) :: body
         type(heavy_top) :: top
         real(wp) :: m0(3) = [1.8_wp, 0.4_wp, -0.9_wp]
-    end type top_at_start
+    end type placed_top
 
     !> Keeps the energy of every state it is shown.
     type, extends(body_observer) :: energy_keeper
-        type(top_at_start) :: item
+        type(placed_top) :: item
         integer :: count = 0
         real(wp) :: energy(0:1000) = 0.0_wp
     contains
@@ -61,14 +62,16 @@ contains
 
     pure function top_number(number) result(item)
         integer, intent(in) :: number
-        type(top_at_start) :: item
+        type(placed_top) :: item
+        type(top_at_start) :: paper
 
         select case (number)
         case (1)
+            paper = papers_top()
             item%name = 'paper'
-            item%body = rigid_body([1.0_wp, 1.0126869887825154_wp, 3.3062374224730378_wp])
-            item%top%force = [9.5586303547238536e-5_wp, 4.8777318247201465e-4_wp, -8.6772148817192390e-4_wp]
-            item%m0 = [-0.34790957088547336_wp, -0.19822914599675923_wp, -0.91633189192763642_wp]
+            item%body = rigid_body(paper%moments)
+            item%top%force = paper%force
+            item%m0 = paper%m0
         case (2)
             item%name = 'asymmetric'
             item%body = rigid_body([0.6_wp, 0.8_wp, 1.0_wp])
@@ -85,7 +88,7 @@ contains
         type(chart_file), intent(inout) :: file
         real(wp), parameter :: h = 0.5_wp
         character(9), parameter :: names(4) = ['free_flow', 'free_flow', 'frb_step ', 'quat_step']
-        type(top_at_start) :: item
+        type(placed_top) :: item
         type(splitting_scheme) :: scheme
         class(body_drift), allocatable :: drift
         ! Drifts, kicks, loop, compensated loop, frb_step, quat_step, drifts and kicks in turn.
@@ -208,7 +211,7 @@ contains
         type(chart_file), intent(inout) :: file
         real(wp), parameter :: t = 100.0_wp, bound = 1.0e-10_wp
         character(8), parameter :: names(2) = [character(8) :: 'srkn14', 'aba864']
-        type(top_at_start) :: item
+        type(placed_top) :: item
         type(splitting_scheme) :: schemes(3)
         type(dmv_drift) :: rival
         real(wp) :: m_end(3), q_end(4), m(3), q(4), start
@@ -287,7 +290,7 @@ contains
         integer, parameter :: steps = 10000
         real(wp), parameter :: sizes(4) = [0.001_wp, 0.01_wp, 0.1_wp, 0.5_wp]
         real(wp), parameter :: small = 1.0e-9_wp
-        type(top_at_start) :: item
+        type(placed_top) :: item
         type(splitting_scheme) :: scheme
         real(wp) :: m(3), q(4), m_end(3), q_end(4), back(2), growth
         integer :: number, j, k, i

@@ -2,18 +2,12 @@
 module frb_chart_torus
     use frb, only: wp, rigid_body, splitting_scheme, heavy_top, body_observer, integrate
     use frb_chart_output, only: chart_file, width, settings, open_table, open_script, draw
+    use frb_chart_solvers, only: top_at_start, papers_top
     use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
     public :: chart_torus
-
-    !> The paper's heavy top, section 4.3.
-    real(wp), parameter :: paper_moments(3) = [1.0_wp, 1.0126869887825154_wp, 3.3062374224730378_wp]
-    real(wp), parameter :: paper_m0(3) = [-0.34790957088547336_wp, -0.19822914599675923_wp, &
-        -0.91633189192763642_wp]
-    real(wp), parameter :: paper_u0(3) = [9.5586303547238536e-5_wp, 4.8777318247201465e-4_wp, &
-        -8.6772148817192390e-4_wp]
 
     !> Collects momenta on a grid of pixels.
     type, extends(body_observer) :: raster
@@ -84,17 +78,19 @@ contains
         real(wp), intent(in) :: low(2), high(2)
         integer, intent(in) :: pixels
         type(raster), intent(out) :: seen
+        type(top_at_start) :: top
         type(heavy_top) :: scene
         real(wp) :: m(3), q(4)
 
         allocate (seen%hits(pixels, pixels), source=0)
         seen%low = low
         seen%high = high
-        scene%force = paper_u0
-        m = paper_m0
-        q = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-        call integrate(rigid_body(paper_moments), splitting_scheme('srkn14'), scene, 0.5_wp, 100000, m, q, &
-            observer=seen)
+        top = papers_top()
+        scene%force = top%force
+        m = top%m0
+        q = top%q0
+        call integrate(rigid_body(top%moments), splitting_scheme('srkn14'), scene, 0.5_wp, 100000, m, q, &
+                       observer=seen)
     end subroutine run_torus
 
     subroutine observe_raster(self, step, t, m, q, stop)

@@ -277,18 +277,18 @@ contains
     pure function c_body_bytes() bind(c, name='frb_body_bytes') result(bytes)
         integer(c_size_t) :: bytes
         type(rigid_body) :: body
-        integer, parameter :: one = 1/merge(1, 0, storage_size(body) == 64*body_doubles)
+        integer, parameter :: fits = 1/merge(1, 0, storage_size(body) == 64*body_doubles)
 
-        bytes = one*8*body_doubles
+        bytes = fits*8*body_doubles
     end function c_body_bytes
 
     !> Bytes of a motion: no more than those of frb.h, or this does not compile.
     pure function c_motion_bytes() bind(c, name='frb_motion_bytes') result(bytes)
         integer(c_size_t) :: bytes
         type(sealed_motion) :: motion
-        integer, parameter :: one = 1/merge(1, 0, storage_size(motion) <= 64*motion_doubles)
+        integer, parameter :: fits = 1/merge(1, 0, storage_size(motion) <= 64*motion_doubles)
 
-        bytes = one*8*motion_doubles
+        bytes = fits*8*motion_doubles
     end function c_motion_bytes
 
     !> Whether a size is at least `least` and no more than the largest default integer.

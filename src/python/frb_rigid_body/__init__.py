@@ -141,11 +141,11 @@ def integrate(body: RigidBody, torque: Union[HeavyTop, Torque], h: float, steps:
     kept = [(t, state_m.copy(), state_q.copy())]
     done = 0
     while done < steps or done == 0:
-        now = min(every, steps - done) if every > 0 else steps
-        _frb.integrate(body, scheme, function, copied, top, h, now, state_m, state_q, time, rests)
+        count = min(every, steps - done) if every > 0 else steps
+        _frb.integrate(body, scheme, function, copied, top, h, count, state_m, state_q, time, rests)
         kept.append((time[0], state_m.copy(), state_q.copy()))
-        done += now
-        if now == 0:
+        done += count
+        if count == 0:
             break
     times, momenta, attitudes = zip(*kept)
     return Trajectory(np.array(times), np.array(momenta), np.array(attitudes))

@@ -7,7 +7,7 @@ program main
     character(8), parameter :: names(2) = [character(8) :: 'srkn11', 'srkn14']
     type(even_torques) :: scene
     type(heavy_top) :: top
-    type(onlooker) :: seen
+    type(onlooker) :: record
     type(rigid_body) :: body(n)
     class(body_drift), allocatable :: drift
     real(wp) :: m(3, n), q(4, n)
@@ -29,7 +29,7 @@ program main
                 call integrate(body(1), scheme, top, 0.01_wp, steps, m(:, 1), q(:, 1), &
                                compensated=compensated)
                 call integrate(body(1), scheme, scene, 0.01_wp, steps, m, q, compensated=compensated)
-                call integrate(body, scheme, scene, 0.01_wp, steps, m, q, seen, compensated=compensated)
+                call integrate(body, scheme, scene, 0.01_wp, steps, m, q, record, compensated=compensated)
                 call integrate(body, scheme, scene, 0.01_wp, steps, m, q, drift=drift, &
                                compensated=compensated)
             end associate
