@@ -235,7 +235,8 @@ contains
 
         call file%put('set multiplot title "'//title//'"')
         call file%put_lines([character(width) :: 'set logscale xy', 'set format y "10^{%T}"', &
-            'set yrange [5e-3:1e19]', 'set ytics 1,1e4', 'set mytics 1', 'set ytics add ("NaN" 1e18)', 'unset key', &
+            'set yrange [5e-3:1e19]', 'set ytics 1,1e4', 'set mytics 1', &
+            'set ytics add ("NaN" 1e18)', 'unset key', &
             'set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0', 'set size 0.25,0.195'])
     end subroutine begin_panels
 

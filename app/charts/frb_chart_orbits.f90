@@ -99,7 +99,7 @@ contains
             'set label 99 "separatrix" tc rgb "#D55E00" at graph 0.02,0.03 front', 'plot \', &
             '  for [k=4:27] "orbits.dat" index k using 1:($3<1?$2:NaN) with lines lc rgb "#cfdbe6" lw 1, \', &
             '  for [k=0:3] "orbits.dat" index k using 1:($3<1?$2:NaN) with lines lc rgb "#f0c9b0" lw 2, \', &
-            '  for [k=4:27] "orbits.dat" index k using 1:($3>0?$2:NaN) with lines lc rgb "#0072B2" lw 1.6, \', &
+            '  for [k=4:27] "orbits.dat" index k using 1:($3>0?$2:NaN) with lines lc rgb "#0072B2" lw 2, \', &
             '  for [k=0:3] "orbits.dat" index k using 1:($3>0?$2:NaN) with lines lc rgb "#D55E00" lw 3.2', &
             'unset multiplot'])
         call file%finish()
@@ -150,7 +150,8 @@ contains
         from = view(axis)
         outwards = from(1:2)/norm2(from(1:2))
         write (file%line, '(4(a,f7.3),a)') 'set arrow from ', from(1), ',', from(2), ' to ', &
-            1.2_wp*outwards(1), ',', 1.2_wp*outwards(2), ' head filled size 0.05,20 lc rgb "#000000" lw 2 front'
+            1.2_wp*outwards(1), ',', 1.2_wp*outwards(2), &
+            ' head filled size 0.05,20 lc rgb "#000000" lw 2 front'
         call file%put()
         write (file%line, '(a,f7.3,a,f7.3,a)') 'set label "'//text//'" at ', 1.3_wp*outwards(1), ',', &
             1.3_wp*outwards(2), either(outwards(1) > 0.5_wp, ' left offset -0.8,0', ' center')//' front'

@@ -284,7 +284,8 @@ contains
         call open_script(options, 'growth', 900, 640, file)
         call file%put_lines([character(width) :: &
             'set logscale xy', 'set format x "10^{%T}"', 'set format y "10^{%T}"', &
-            'set xrange [0.8:1.2e6]', 'set yrange [1e-17:10]', 'set mytics 1', 'set xlabel "number of steps to t = 16"', &
+            'set xrange [0.8:1.2e6]', 'set yrange [1e-17:10]', 'set mytics 1', &
+            'set xlabel "number of steps to t = 16"', &
             'set ylabel "error of attitude, median of 9 bodies  [rad]"', &
             'set title "Cutting the same time into more steps"', &
             'set key outside right center vertical spacing 1.1 samplen 2.2 Left reverse', 'plot \', &
