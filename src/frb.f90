@@ -14,8 +14,7 @@ module frb
     use frb_free_flow_many, only: free_flow, free_flow_columns
     use frb_free_motion, only: free_motion
     use frb_elliptic, only: carlson_rf => rf, carlson_rc => rc, carlson_rj => rj, carlson_rd => rd, &
-        jacobi_functions => jacobi, ellip_k, ellip_f, jacobi_am, landen_step, ellpi, ellint_pi, &
-        ellint_pi_between, gauss_legendre, eint_gauss
+        jacobi_functions => jacobi, ellip_k, ellip_f, jacobi_am, ellpi, ellint_pi, eint_gauss
     use frb_order_conditions, only: order_report, order_conditions
     use frb_schemes, only: splitting_scheme, scheme_names, mirrored
     use frb_torque, only: body_scene, group_scene, body_observer, group_observer, body_drift, &

@@ -165,9 +165,9 @@ contains
         spoilt%until = 0.0_wp
         call integrate(item%body, scheme, spoilt, 0.1_wp, 100, m, q, t=time, stat=stat)
         call refused('torque-that-is-nan', status_bad_torque)
-        spoilt%until = 7.2_wp
-        call ends_with_a_whole_step('torque-that-becomes-nan', scheme)
-        call ends_with_a_whole_step('torque-that-becomes-nan-in-a-bab-scheme', splitting_scheme('srkn11'))
+        call ends_with_a_whole_step(t, 'torque-that-becomes-nan', item, scheme)
+        call ends_with_a_whole_step(t, 'torque-that-becomes-nan-in-a-bab-scheme', item, &
+                                    splitting_scheme('srkn11'))
         call integrate(item%body, scheme, item%top, 0.1_wp, 5, m, q, t=time, drift=failing, stat=stat)
         call refused('drift-that-fails', status_bad_option)
         call integrate(item%body, scheme, item%top, 0.0_wp, 5, m, q, t=time, stat=stat)
@@ -209,30 +209,6 @@ contains
 
     contains
 
-        !> A torque that is NaN from time 7.2 on ends a run in steps of 0.1 from 3 with step 41 or 42.
-        subroutine ends_with_a_whole_step(what, scheme)
-            character(*), intent(in) :: what
-            type(splitting_scheme), intent(in) :: scheme
-            type(spoilt_torque) :: torque
-            real(wp) :: m_end(3), q_end(4), t_end, m_short(3), q_short(4), t_short
-            integer :: done
-
-            m_end = m
-            q_end = q
-            t_end = time
-            torque%until = 7.2_wp
-            call integrate(item%body, scheme, torque, 0.1_wp, 100, m_end, q_end, t=t_end, stat=stat)
-            done = nint((t_end - time)/0.1_wp)
-            m_short = m
-            q_short = q
-            t_short = time
-            torque%until = huge(time)
-            call integrate(item%body, scheme, torque, 0.1_wp, done, m_short, q_short, t=t_short)
-            call t%ok(what//'-ends-the-run-with-the-last-whole-step', stat == status_bad_torque &
-                      .and. (done == 41 .or. done == 42) .and. all(abs(m_end - m_short) <= 0.0_wp) &
-                      .and. all(abs(q_end - q_short) <= 0.0_wp) .and. abs(t_end - t_short) <= 0.0_wp)
-        end subroutine ends_with_a_whole_step
-
         subroutine refused(what, code)
             character(*), intent(in) :: what
             integer, intent(in) :: code
@@ -243,5 +219,32 @@ contains
         end subroutine refused
 
     end subroutine test_refused
+
+    !> A torque that is NaN from time 7.2 on ends a run in steps of 0.1 from 3 with step 41 or 42.
+    subroutine ends_with_a_whole_step(t, what, item, scheme)
+        type(tally), intent(inout) :: t
+        character(*), intent(in) :: what
+        type(top_case), intent(in) :: item
+        type(splitting_scheme), intent(in) :: scheme
+        real(wp), parameter :: start = 3.0_wp
+        type(spoilt_torque) :: torque
+        real(wp) :: m_end(3), q_end(4), t_end, m_short(3), q_short(4), t_short
+        integer :: done, stat
+
+        m_end = item%m0
+        q_end = item%q0
+        t_end = start
+        torque%until = 7.2_wp
+        call integrate(item%body, scheme, torque, 0.1_wp, 100, m_end, q_end, t=t_end, stat=stat)
+        done = nint((t_end - start)/0.1_wp)
+        m_short = item%m0
+        q_short = item%q0
+        t_short = start
+        torque%until = huge(start)
+        call integrate(item%body, scheme, torque, 0.1_wp, done, m_short, q_short, t=t_short)
+        call t%ok(what//'-ends-the-run-with-the-last-whole-step', stat == status_bad_torque &
+                  .and. (done == 41 .or. done == 42) .and. all(abs(m_end - m_short) <= 0.0_wp) &
+                  .and. all(abs(q_end - q_short) <= 0.0_wp) .and. abs(t_end - t_short) <= 0.0_wp)
+    end subroutine ends_with_a_whole_step
 
 end module frb_test_splitting_calls

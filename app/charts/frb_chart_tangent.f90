@@ -2,13 +2,14 @@
 !> against closeness to every place where methods are known to fail; central differences and dual numbers
 !> beside `flow_tangent`, with their cost.
 module frb_chart_tangent
-    use frb, only: wp, flow_tangent, free_flow, gauss_legendre, quat_conjugate, quat_product, rigid_body
+    use frb, only: wp, flow_tangent, free_flow, quat_conjugate, quat_product, rigid_body
     use frb_chart_failure, only: panels, names, distances, new_failure_case, failed, begin_panels, &
         begin_panel, begin_legend
     use frb_chart_output, only: chart_file, width, settings, open_table, open_script, draw, progress, say, &
         either
     use frb_chart_truth, only: free_case
     use frb_dual_steps, only: dual_step, points
+    use frb_elliptic, only: gauss_legendre
     use frb_taylor_truth, only: qp, long_truth
     use, intrinsic :: iso_fortran_env, only: int64
     implicit none

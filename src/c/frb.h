@@ -1,5 +1,10 @@
 /* Exact motion of a free rigid body: the C interface of frb.
  *
+ *     frb_body body;
+ *     double moments[3] = {0.6, 0.8, 1.0}, m[3] = {1.8, 0.4, -0.9}, q[4] = {1.0, 0.0, 0.0, 0.0};
+ *     frb_body_from_moments(moments, &body);
+ *     frb_flow(&body, 10.0, m, q);                  // m and q after ten units of time
+ *
  * m is angular momentum in body axes, 3 doubles; q is attitude, a quaternion with its scalar first that takes body
  * axes to space, 4 doubles. Any consistent units. Angles are in rad.
  *
