@@ -24,45 +24,17 @@ program frb_charts
         'heavy-top', 'ratios', 'torque', 'failure', 'growth', 'triangle', 'scale', 'water', 'orbits', &
         'tangent', 'agreement']
     type(settings) :: options
-    character(:), allocatable :: argument
     logical :: wanted(size(names))
-    integer :: i, which, code
+    integer :: i
 
     call full_files_are_errors()
-    wanted = .false.
-    options%folder = 'charts'
-    i = 1
-    do while (i <= command_argument_count())
-        argument = argument_at(i)
-        select case (argument)
-        case ('--quick')
-            options%quick = .true.
-        case ('--out')
-            i = i + 1
-            options%folder = argument_at(i)
-            if (len(options%folder) == 0) call give_up('--out needs a folder')
-        case ('--help', '-h')
-            call list_charts()
-            stop
-        case ('all')
-            where (names /= 'agreement') wanted = .true.
-        case default
-            which = findloc(names == argument, .true., dim=1)
-            if (which == 0) call give_up('no such chart: '//argument)
-            wanted(which) = .true.
-        end select
-        i = i + 1
-    end do
+    call read_command()
     if (.not. any(wanted)) then
         call list_charts()
         stop
     end if
     if (.not. has_quad) call give_up('the truth needs a compiler with quadruple precision')
-    if (index(options%folder, "'") > 0) call give_up('a quote in the name of the folder')
-    call execute_command_line('mkdir -p '''//options%folder//'''', exitstat=code, cmdstat=i)
-    if (code /= 0) call give_up('cannot make the folder '//options%folder)
-    call execute_command_line('test -t 2', exitstat=code, cmdstat=i)
-    options%terminal = code == 0
+    call make_folder()
     do i = 1, size(names)
         if (.not. wanted(i)) cycle
         call say(trim(names(i)))
@@ -105,6 +77,48 @@ program frb_charts
 
 contains
 
+    !> Reads the options and the charts that are wanted.
+    subroutine read_command()
+        character(:), allocatable :: argument
+        integer :: place, which
+
+        wanted = .false.
+        options%folder = 'charts'
+        place = 1
+        do while (place <= command_argument_count())
+            argument = argument_at(place)
+            select case (argument)
+            case ('--quick')
+                options%quick = .true.
+            case ('--out')
+                place = place + 1
+                options%folder = argument_at(place)
+                if (len(options%folder) == 0) call give_up('--out needs a folder')
+            case ('--help', '-h')
+                call list_charts()
+                stop
+            case ('all')
+                where (names /= 'agreement') wanted = .true.
+            case default
+                which = findloc(names == argument, .true., dim=1)
+                if (which == 0) call give_up('no such chart: '//argument)
+                wanted(which) = .true.
+            end select
+            place = place + 1
+        end do
+    end subroutine read_command
+
+    !> Makes the folder of tables and pictures, and looks whether progress can be shown.
+    subroutine make_folder()
+        integer :: code, command_code
+
+        if (index(options%folder, "'") > 0) call give_up('a quote in the name of the folder')
+        call execute_command_line('mkdir -p '''//options%folder//'''', exitstat=code, cmdstat=command_code)
+        if (code /= 0) call give_up('cannot make the folder '//options%folder)
+        call execute_command_line('test -t 2', exitstat=code, cmdstat=command_code)
+        options%terminal = code == 0
+    end subroutine make_folder
+
     !> The argument at this place, '' past the end.
     function argument_at(place) result(text)
         integer, intent(in) :: place
@@ -116,6 +130,7 @@ contains
         if (length > 0) call get_command_argument(place, text)
     end function argument_at
 
+    !> The text without arguments and of --help.
     subroutine list_charts()
         call say('usage: fpm run frb_charts --profile release -- [WHAT ...] [--quick] [--out DIR]')
         call say('WHAT: all (all charts but the last), or any of')

@@ -59,6 +59,7 @@ program loops
 
 contains
 
+    !> Time of a step of one body called as from C, over that called from Fortran.
     function through_c(h) result(ratio)
         real(wp), intent(in) :: h
         integer, parameter :: steps = 10000
@@ -91,6 +92,7 @@ contains
         ratio = least(1)/least(2)
     end function through_c
 
+    !> Time of the user's own loop over the plan of a scheme, over that of `integrate`.
     function own_loop(name) result(ratio)
         character(*), intent(in) :: name
         type(rigid_body) :: body(n)
