@@ -9,7 +9,7 @@ module frb_test_drifts
     use frb_scenes, only: heavy_top
     use frb_schemes, only: splitting_scheme
     use frb_splitting, only: integrate
-    use frb_status, only: status_ok, status_bad_option
+    use frb_status, only: status_ok, status_bad_momentum, status_bad_option
     use frb_torque, only: body_drift
     use frb_torque_cases, only: top_case, known_top, distance
     implicit none
@@ -24,10 +24,11 @@ contains
     subroutine test_drifts(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('drifts', 70)
+        call t%open_suite('drifts', 88)
         call test_runs(t)
         call test_tensors(t)
         call test_almost_aligned(t)
+        call test_linear_rotors(t)
         call test_names(t)
         call t%close_suite()
     end subroutine test_drifts
@@ -201,6 +202,45 @@ contains
         end function lost_by
 
     end subroutine test_tensors
+
+    !> Linear rotors, by moments and by a tensor, move by every drift as by the free flow; a momentum along the
+    !> axis is refused.
+    subroutine test_linear_rotors(t)
+        type(tally), intent(inout) :: t
+        character(11), parameter :: names(3) = ['frb_step   ', 'quat_step  ', 'quat_step:7']
+        real(wp), parameter :: moments(3) = [1.5_wp, 0.0_wp, 1.5_wp]
+        class(body_drift), allocatable :: drift
+        type(splitting_scheme) :: scheme
+        type(rigid_body) :: rotor
+        type(heavy_top) :: top
+        real(wp) :: m(3), q(4), m_flow(3), q_flow(4), r(3, 3), tensor(3, 3), start(3)
+        integer :: i, k, stat
+
+        scheme = splitting_scheme('srkn14')
+        do k = 1, 2
+            r = quat_to_matrix(merge([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], [0.1_wp, -0.7_wp, 0.5_wp, 0.5_wp], k == 1))
+            tensor = matmul(r*spread(moments, 1, 3), transpose(r))
+            if (k == 1) rotor = rigid_body(moments)
+            if (k == 2) rotor = rigid_body((tensor + transpose(tensor))/2)
+            top%centre = r(:, 2)
+            start = matmul(r, [0.7_wp, 0.0_wp, -1.1_wp])
+            m_flow = start
+            q_flow = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+            call integrate(rotor, scheme, top, 0.5_wp, 20, m_flow, q_flow)
+            do i = 1, size(names)
+                call drift_by_name(trim(names(i)), drift)
+                m = start
+                q = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+                call integrate(rotor, scheme, top, 0.5_wp, 20, m, q, drift=drift, stat=stat)
+                call t%equal(trim(names(i))//'-moves-a-linear-rotor', stat, status_ok)
+                call t%at_most(trim(names(i))//'-moves-a-linear-rotor-as-the-flow-does', &
+                               distance(m, q, m_flow, q_flow), 8192*eps)
+                m = start + 0.01_wp*r(:, 2)
+                call integrate(rotor, scheme, top, 0.5_wp, 1, m, q, drift=drift, stat=stat)
+                call t%equal(trim(names(i))//'-refuses-a-momentum-along-the-axis', stat, status_bad_momentum)
+            end do
+        end do
+    end subroutine test_linear_rotors
 
     !> Names of drifts that are known, and names that are refused.
     subroutine test_names(t)

@@ -23,7 +23,7 @@ contains
     subroutine test_extrapolate(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('extrapolate', 82)
+        call t%open_suite('extrapolate', 84)
         call test_order(t)
         call test_tolerances(t)
         call test_free(t)
@@ -254,7 +254,8 @@ contains
     subroutine test_refused(t)
         type(tally), intent(inout) :: t
         type(top_case) :: item
-        type(rigid_body) :: no_body
+        type(rigid_body) :: no_body, turned
+        type(spoilt_torque) :: pulse
         real(wp) :: m(3), q(4), time, nan
         integer :: stat
 
@@ -281,7 +282,17 @@ contains
         m(2) = nan
         call extrapolate(item%body, item%top, 1.0_wp, m, q, 1.0e-9_wp, stat=stat)
         call t%equal('nan-momentum-is-refused', stat, status_bad_momentum)
+        ! Compiled with -Ofast, such runs must end.
+        turned = rigid_body(reshape( &
+                                    [1.0_wp, 0.1_wp, 0.2_wp, 0.1_wp, 1.5_wp, -0.1_wp, 0.2_wp, -0.1_wp, &
+                                     2.2_wp], [3, 3]))
+        pulse%until = huge(time)
+        m = [0.3_wp, nan, 1.2_wp]
+        call extrapolate(turned, pulse, 1.0_wp, m, q, 1.0e-9_wp, stat=stat)
+        call t%equal('nan-momentum-of-a-body-by-its-tensor-is-refused', stat, status_bad_momentum)
         m = item%m0
+        call extrapolate(turned, pulse, nan, m, q, 1.0e-9_wp, stat=stat)
+        call t%equal('nan-time-of-a-body-by-its-tensor-is-refused', stat, status_bad_time)
         q = 1.01_wp*q
         call extrapolate(item%body, item%top, 1.0_wp, m, q, 1.0e-9_wp, stat=stat)
         call t%equal('attitude-of-another-norm-is-refused', stat, status_bad_attitude)

@@ -34,7 +34,7 @@ contains
         type(init_values) :: values
         character(:), allocatable :: error
 
-        call t%open_suite('files-list', 16)
+        call t%open_suite('files-list', 18)
         call write_text('0.1'//nl//moments//nl//'.1 ,.2'//nl//' ,.3, and more'//after)
         call read_init_file(path, 2, values, error)
         call t%ok('commas-and-repeat-counts-are-read', .not. allocated(error))
@@ -74,6 +74,14 @@ contains
         call read_init_file(path, 2, values, error)
         call t%close_to('every-exponent-is-read', [values%h, values%moments, values%m], &
                         [100.0_wp, 1.5_wp, 2.5_wp, 3.0_wp, 0.2_wp, 0.2_wp, 0.2_wp], 0.0_wp)
+        ! Read item after item, 7 is q(1) and the slash ends the file; read by lines, 7 is dropped.
+        call write_text('1'//nl//'1 1 1'//nl//'1 1 1, 7'//nl//'1 0 0 0/ no more')
+        call read_init_file(path, 2, values, error)
+        call t%ok('a-surplus-number-that-a-slash-makes-up-for-is-told', &
+                  says(error, "line 3: after m(3): expected the end of the line, found '7'"))
+        call write_text('1'//nl//'1 1 1'//nl//'1 1 1 1/s'//nl//'1 0 0 0/ no more')
+        call read_init_file(path, 2, values, error)
+        call t%ok('a-unit-with-a-slash-is-no-number', .not. allocated(error))
         call write_text(char(239)//char(187)//char(191)//'0.5'//nl//'1 1 1'//nl//'1 1 1'//nl//'1 0 0 0')
         call read_init_file(path, 2, values, error)
         call t%ok('a-byte-order-mark-is-skipped', .not. allocated(error))

@@ -18,7 +18,7 @@ contains
     subroutine test_schemes(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('schemes', 166)
+        call t%open_suite('schemes', 167)
         call test_named(t)
         call test_conditions(t)
         call test_modified(t)
@@ -224,6 +224,8 @@ contains
         call t%equal('no-kick-is-refused', scheme%status, status_bad_scheme)
         scheme = splitting_scheme(halves, [ieee_value(1.0_wp, ieee_quiet_nan)])
         call t%equal('nan-coefficient-is-refused', scheme%status, status_bad_scheme)
+        scheme = splitting_scheme([0.4_wp, 0.4_wp], one, tolerance=ieee_value(1.0_wp, ieee_quiet_nan))
+        call t%equal('nan-is-no-tolerance-of-a-sum', scheme%status, status_bad_scheme)
         scheme = splitting_scheme([ieee_value(1.0_wp, ieee_positive_inf), 0.0_wp], one)
         call t%equal('infinite-coefficient-is-refused', scheme%status, status_bad_scheme)
         many = 1/real(most_stages + 1, wp)

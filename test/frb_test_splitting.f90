@@ -13,6 +13,7 @@ module frb_test_splitting
     use frb_torque_cases, only: top_case, known_top, papers_m_after_one_step, papers_m_at_5000, distance, &
         recorder, pulsed_torque, spoilt_torque, fitted_change, plain_drift, tilting_drift
     use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
+    use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
@@ -25,7 +26,7 @@ contains
     subroutine test_splitting(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('splitting', 181)
+        call t%open_suite('splitting', 183)
         call test_values(t)
         call test_orders(t)
         call test_long_run(t)
@@ -207,6 +208,7 @@ contains
         type(spoilt_torque) :: no_potential
         real(wp) :: m(3), q(4), tensor(3, 3), h
         integer :: i, k
+        logical :: stop_here
 
         body = rigid_body([1.0_wp, 1.0_wp, 0.5_wp])
         monitor%body = body
@@ -272,6 +274,13 @@ contains
                         eps, eps**2)
         call t%ok('energy-without-a-potential-is-nan', &
                   ieee_is_nan(total_energy(item%body, no_potential, 0.0_wp, item%m0, item%q0)))
+        deallocate (monitor%scene)
+        allocate (monitor%scene, source=no_potential)
+        do i = 0, 1
+            call monitor%observe(int(i, int64), 0.0_wp, item%m0, item%q0, stop_here)
+        end do
+        call t%ok('monitor-tells-that-there-is-no-energy', ieee_is_nan(monitor%energy_error))
+        call t%close_to('monitor-tells-the-other-errors', monitor%norm_error, abs(norm_defect(item%q0)), 0.0_wp)
     end subroutine test_invariants
 
     !> Compensated runs: rounding errors are carried over, so none of them accumulate.

@@ -4,7 +4,8 @@ nothing_hangs_under_fast_math() {
     local suite check code
     "$fpm" test --flag "-Ofast -march=native" -- --list
     check=$(find build -path '*test*' -name check -type f | head -n 1)
-    for suite in base bodies carlson agm legendre free-motion free-flow flow-limits flow-scales flow-batches flow-splits flow-fuzz flow-columns; do
+    for suite in base bodies carlson agm legendre free-motion free-flow flow-limits flow-scales flow-batches flow-splits flow-fuzz flow-columns \
+        extrapolate extrapolate-torques splitting-calls groups; do
         code=0
         timeout 60 "$check" "$suite" >suite.log 2>&1 || code=$?
         echo "$suite: exit code $code"

@@ -1,10 +1,10 @@
 !> The real kind of the library and constants of this kind; quadruple precision for tests and charts.
 module frb_kinds
-    use, intrinsic :: iso_fortran_env, only: real64, real128
+    use, intrinsic :: iso_fortran_env, only: int64, real64, real128
     implicit none
     private
 
-    public :: wp, qp, has_quad, pi, half_pi, two_pi, unit_roundoff, most_points
+    public :: wp, qp, has_quad, pi, half_pi, two_pi, unit_roundoff, most_points, is_number
 
     !> Working precision: IEEE double.
     integer, parameter :: wp = real64
@@ -23,5 +23,17 @@ module frb_kinds
 
     !> Largest number of Gauss points, np, of a semi-exact step or of an integral.
     integer, parameter :: most_points = 1000
+
+contains
+
+    !> Whether x is neither NaN nor Inf, by its bits: with flags as -Ofast, ieee_is_finite is always true. For
+    !> loops that would not end with such numbers.
+    elemental function is_number(x) result(number)
+        real(wp), intent(in) :: x
+        logical :: number
+        integer, parameter :: first_bit = 52, bits = 11     ! of the exponent
+
+        number = ibits(transfer(x, 0_int64), first_bit, bits) < 2**bits - 1
+    end function is_number
 
 end module frb_kinds

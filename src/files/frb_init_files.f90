@@ -58,8 +58,8 @@ contains
     !> Reads the init file of an example.
     !>
     !> The published programs read every item from a line of its own and drop further words on the line; here
-    !> items may share a line. So a file that is refused is read again in the published way. If this succeeds,
-    !> the error names the first number that was dropped.
+    !> items may share a line. So a file is read again in the published way. If this succeeds, and the file is
+    !> refused or has other values, the error names the first number that was dropped.
     subroutine read_init_file(path, example, values, error, output)
         character(*), intent(in) :: path                    !! -: standard input
         integer, intent(in) :: example                      !! 0 to 4
@@ -81,10 +81,12 @@ contains
         end if
         if (.not. allocated(error)) then
             call read_items(file, example, values, error)
+            call file%start_over(by_lines=.true.)
+            call read_items(file, example, by_lines, again)
+            if (allocated(file%surplus) .and. .not. allocated(again)) then
+                if (allocated(error) .or. differ(values, by_lines)) error = file%surplus
+            end if
             if (allocated(error)) then
-                call file%start_over(by_lines=.true.)
-                call read_items(file, example, by_lines, again)
-                if (allocated(file%surplus) .and. .not. allocated(again)) error = file%surplus
                 error = error//' (example '//achar(iachar('0') + example)//' has '// &
                         trim(contents(example))//')'
                 values = init_values()
@@ -92,6 +94,23 @@ contains
         end if
         call file%close_file()
     end subroutine read_init_file
+
+    !> Whether the contents of two files differ.
+    pure function differ(one, other)
+        type(init_values), intent(in) :: one, other
+        logical :: differ
+
+        differ = any(abs(numbers(one) - numbers(other)) > 0.0_wp)
+    end function differ
+
+    !> All contents as numbers.
+    pure function numbers(values)
+        type(init_values), intent(in) :: values
+        real(wp) :: numbers(41)
+
+        numbers = [values%a, values%b, values%h, values%t_final, values%m, reshape(values%attitude, [9]), &
+                   values%q, values%moments, values%u0, real([values%steps, values%points], wp)]
+    end function numbers
 
     !> Reads all items of an example; a number after the last item is an error.
     subroutine read_items(file, example, values, error)

@@ -76,11 +76,12 @@ contains
         real(wp), intent(in) :: limit, p(lanes), r(lanes)
         real(wp), intent(inout) :: part(lanes)
         real(wp), intent(out) :: halvings(lanes)
+        integer, parameter :: most = 2*maxexponent(1.0_wp)      ! of a finite number
         real(wp) :: over
-        integer :: l
+        integer :: i, l
 
         halvings(:n) = 0.0_wp
-        do
+        do i = 1, most
             do l = 1, n
                 over = merge(1.0_wp, 0.0_wp, max(p(l), r(l))*(part(l)*part(l)) > limit)
                 halvings(l) = halvings(l) + over

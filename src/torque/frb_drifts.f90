@@ -3,7 +3,7 @@
 module frb_drifts
     use frb_flow_axes, only: turn_back
     use frb_free_flow, only: core_of, free_flow, rigid_body
-    use frb_inertia, only: body_core
+    use frb_inertia, only: body_core, core_from_moments, keep_off_axis
     use frb_kinds, only: wp, most_points
     use frb_matrix_step, only: frb_step
     use frb_quat_step, only: quat_step
@@ -102,8 +102,7 @@ contains
         type(body_core) :: core
         real(wp) :: turn(3, 3), old(3), n(3)
 
-        core = core_of(body)
-        stat = core%status
+        call prepare(body, m, core, stat)
         if (stat /= status_ok) return
         old = m
         if (core%needs_rotation) old = matmul(m, core%axes)
@@ -130,8 +129,7 @@ contains
         type(body_core) :: core
         real(wp) :: turn(4), old(3), n(3)
 
-        core = core_of(body)
-        stat = core%status
+        call prepare(body, m, core, stat)
         if (stat /= status_ok) return
         if (core%needs_rotation) then
             old = matmul(m, core%axes)
@@ -143,6 +141,21 @@ contains
             call quat_step(m, q, h, core%moments, m, q, self%points, self%frame, stat)
         end if
     end subroutine advance_by_quaternion
+
+    !> The constants of the body. A linear rotor moves as a sphere of its moment, which the paper's steps take;
+    !> rounding errors of m along its axis are removed, more is refused.
+    pure subroutine prepare(body, m, core, stat)
+        type(rigid_body), intent(in) :: body
+        real(wp), intent(inout) :: m(3)
+        type(body_core), intent(out) :: core
+        integer, intent(out) :: stat
+
+        core = core_of(body)
+        stat = core%status
+        if (stat /= status_ok .or. .not. core%linear) return
+        call keep_off_axis(core, m, stat)
+        core = core_from_moments(spread(maxval(core%moments), 1, 3))
+    end subroutine prepare
 
     !> The change of m when the body turns by the unit quaternion r: m is constant in space. n - old would
     !> lose the digits below those of m. With nearly principal axes the rotation of m is in these digits, and

@@ -14,13 +14,12 @@ module frb_extrapolation
     use frb_extrapolation_step, only: extrapolated_body, new_extrapolated_body, ask_torque, try_step, &
         accept_step, rounding
     use frb_free_flow, only: core_of, rigid_body
-    use frb_kinds, only: wp
+    use frb_kinds, only: is_number, wp
     use frb_rotations, only: is_unit_quat, quat_conjugate, quat_product, quat_rotate
     use frb_status, only: return_or_stop, status_ok, status_bad_attitude, status_bad_count, &
         status_bad_momentum, &
         status_bad_option, status_bad_time, status_bad_torque, status_stopped, status_too_rough
     use frb_torque, only: body_scene, body_observer
-    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
     use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
@@ -109,7 +108,7 @@ contains
         if (present(step)) fixed = step
         code = body%status()
         if (code == status_ok) code = check_times(time, t_now, fixed, tolerance)
-        if (code == status_ok .and. .not. all(ieee_is_finite(m))) code = status_bad_momentum
+        if (code == status_ok .and. .not. all(is_number(m))) code = status_bad_momentum
         if (code == status_ok .and. .not. is_unit_quat(q)) code = status_bad_attitude
         call scene%agree(code)
         if (code == status_ok) then
@@ -193,11 +192,11 @@ contains
         real(wp), parameter :: longest = 1.0e300_wp, most_steps = 1.0e15_wp
 
         code = status_bad_time
-        if (.not. all(ieee_is_finite([time, start, fixed]))) return
+        if (.not. all(is_number([time, start, fixed]))) return
         if (abs(time) > longest .or. abs(start) > longest .or. fixed < 0.0_wp) return
         if (fixed > 0.0_wp .and. fixed < abs(time)/most_steps) return
         code = status_bad_option
-        if (.not. ieee_is_finite(tolerance)) return
+        if (.not. is_number(tolerance)) return
         if (tolerance < 0.0_wp) return
         code = status_ok
     end function check_times
@@ -211,7 +210,7 @@ contains
         type(extrapolation_report), intent(inout) :: told
         integer, intent(out) :: code
         class(body_observer), intent(inout), optional :: observer
-        real(wp) :: start, left, h, least, guess, ratio, before, reach, few_angle
+        real(wp) :: start, left, left_before, h, least, guess, ratio, before, reach, few_angle
         integer :: short_steps, refused
         logical :: accepted, last
 
@@ -256,7 +255,10 @@ contains
                 cycle
             end if
             call accept_step(moved, sign(h, time), code)
+            left_before = left
             left = merge(0.0_wp, left - sign(h, time), last)
+            ! With flags as -Ofast, where NaN can be equal to anything, only bits end the loop.
+            if (transfer(abs(left), 0_int64) == transfer(abs(left_before), 0_int64)) code = status_bad_time
             t_now = merge(start + time, start + (time - left), last)
             call note_step(told, h, moved%error, last)
             ! The guess has no meaning if there was no torque at the start.

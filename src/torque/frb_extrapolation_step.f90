@@ -6,11 +6,10 @@ module frb_extrapolation_step
         last_differences, torques_of_step, set_for
     use frb_flow_state, only: flow_state => flow_one
     use frb_inertia, only: body_core, keep_off_axis
-    use frb_kinds, only: wp
+    use frb_kinds, only: is_number, wp
     use frb_rotations, only: quat_conjugate, quat_product, quat_rotate
     use frb_status, only: status_ok, status_bad_torque
     use frb_torque, only: body_scene, scene_lanes
-    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
     use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
@@ -74,7 +73,7 @@ contains
         else
             call scene%torque(self%x(4:7), t, self%tau, code)
         end if
-        if (code == status_ok .and. .not. all(ieee_is_finite(self%tau))) code = status_bad_torque
+        if (code == status_ok .and. .not. all(is_number(self%tau))) code = status_bad_torque
         if (code /= status_ok) self%tau = 0.0_wp
         self%torque_known = .true.
         asked = asked + 1
@@ -128,7 +127,7 @@ contains
         asked = asked + torques_of_step(set)
         self%error = 1.0_wp
         self%is_free = .false.
-        self%is_finite = ieee_is_finite(sum(state%sizes) + sum(abs(change)))
+        self%is_finite = is_number(sum(state%sizes) + sum(abs(change)))
         if (.not. self%is_finite) return
         self%is_free = .not. sum(state%sizes) > 0.0_wp
         if (self%is_free) error = 0.0_wp

@@ -5,7 +5,7 @@ module frb_invariants
     use frb_rotations, only: quat_rotate
     use frb_status, only: status_ok
     use frb_torque, only: body_scene, group_scene, body_observer
-    use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
+    use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_value, ieee_quiet_nan
     use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
@@ -38,7 +38,8 @@ module frb_invariants
         module procedure spatial_momentum_of_group
     end interface spatial_momentum
 
-    !> An observer that stores the largest differences from the values at the start of the run.
+    !> An observer that stores the largest differences from the values at the start of the run; NaN where a
+    !> value cannot be computed, as the energy of a scene without a potential.
     !> `axis` is the direction in space along which the momentum is conserved, if any.
     type, extends(body_observer) :: invariant_monitor
         type(rigid_body) :: body
@@ -200,9 +201,22 @@ contains
             self%momentum_error = 0.0_wp
             self%norm_error = 0.0_wp
         end if
-        self%energy_error = max(self%energy_error, abs(energy - self%energy))
-        self%momentum_error = max(self%momentum_error, abs(momentum - self%momentum))
-        self%norm_error = max(self%norm_error, abs(norm_defect(q)))
+        call keep_larger(abs(energy - self%energy), self%energy_error)
+        call keep_larger(abs(momentum - self%momentum), self%momentum_error)
+        call keep_larger(abs(norm_defect(q)), self%norm_error)
     end subroutine monitor_body
+
+    !> The larger of the error so far and a new one; NaN once one of them is NaN, which max may ignore.
+    pure subroutine keep_larger(error, largest)
+        real(wp), intent(in) :: error
+        real(wp), intent(inout) :: largest
+
+        if (ieee_is_nan(largest)) return
+        if (ieee_is_nan(error)) then
+            largest = error
+        else
+            largest = max(largest, error)
+        end if
+    end subroutine keep_larger
 
 end module frb_invariants

@@ -220,6 +220,7 @@ contains
         inconsistency = 1.0e-12_wp
         if (present(tolerance)) inconsistency = tolerance
         if (.not. (is_palindrome(a) .and. is_palindrome(b))) return
+        if (.not. ieee_is_finite(inconsistency)) return
         if (abs(sum(a) - 1) > inconsistency .or. abs(sum(b) - 1) > inconsistency) return
         if (present(c)) then
             if (size(c) /= size(b)) return
