@@ -40,27 +40,27 @@ public:
 
     void initial_integrate(std::vector<Molecule> &molecules)
     {
-        for (Molecule &one : molecules) {
-            for (int i = 0; i < 3; i++) one.angmom[i] += 0.5*dt*one.torque[i];
-            for (int i = 0; i < 3; i++) one.x[i] += dt*one.v[i];
+        for (Molecule &molecule : molecules) {
+            for (int i = 0; i < 3; i++) molecule.angmom[i] += 0.5*dt*molecule.torque[i];
+            for (int i = 0; i < 3; i++) molecule.x[i] += dt*molecule.v[i];
             // The momentum in space does not change in the drift; the one in the body is scratch.
             double m[3];
-            rotate(one.quat, -1, one.angmom, m);
-            const int status = frb_flow(&body, dt, m, one.quat);
+            rotate(molecule.quat, -1, molecule.angmom, m);
+            const int status = frb_flow(&body, dt, m, molecule.quat);
             if (status != FRB_OK) fail(status);
         }
     }
 
     void final_integrate(std::vector<Molecule> &molecules)
     {
-        for (Molecule &one : molecules)
-            for (int i = 0; i < 3; i++) one.angmom[i] += 0.5*dt*one.torque[i];
+        for (Molecule &molecule : molecules)
+            for (int i = 0; i < 3; i++) molecule.angmom[i] += 0.5*dt*molecule.torque[i];
     }
 
-    double kinetic_energy(const Molecule &one, const double moments[3]) const
+    double kinetic_energy(const Molecule &molecule, const double moments[3]) const
     {
         double m[3];
-        rotate(one.quat, -1, one.angmom, m);
+        rotate(molecule.quat, -1, molecule.angmom, m);
         return 0.5*(m[0]*m[0]/moments[0] + m[1]*m[1]/moments[1] + m[2]*m[2]/moments[2]);
     }
 
@@ -84,12 +84,12 @@ const double dipole[3] = {0, 0, 1};     // in the body
 double force(std::vector<Molecule> &molecules)
 {
     double energy = 0;
-    for (Molecule &one : molecules) {
+    for (Molecule &molecule : molecules) {
         double d[3];
-        rotate(one.quat, 1, dipole, d);
-        one.torque[0] = d[1]*field;
-        one.torque[1] = -d[0]*field;
-        one.torque[2] = 0;
+        rotate(molecule.quat, 1, dipole, d);
+        molecule.torque[0] = d[1]*field;
+        molecule.torque[1] = -d[0]*field;
+        molecule.torque[2] = 0;
         energy -= field*d[2];
     }
     return energy;
@@ -106,13 +106,13 @@ int main()
     FixRigid fix(moments, dt);
 
     for (std::size_t i = 0; i < molecules.size(); i++) {
-        Molecule &one = molecules[i];
+        Molecule &molecule = molecules[i];
         const double angle = 0.37*double(i);
-        one = Molecule{};
-        one.x[0] = double(i);
-        one.quat[0] = std::cos(angle);
-        one.quat[1] = std::sin(angle);
-        for (int k = 0; k < 3; k++) one.angmom[k] = std::sin(1.0 + 2.3*double(i) + k);
+        molecule = Molecule{};
+        molecule.x[0] = double(i);
+        molecule.quat[0] = std::cos(angle);
+        molecule.quat[1] = std::sin(angle);
+        for (int k = 0; k < 3; k++) molecule.angmom[k] = std::sin(1.0 + 2.3*double(i) + k);
     }
     double first = 0, about_field = 0, furthest = 0, moved = 0;
     for (int step = 0; step <= steps; step++) {
@@ -120,9 +120,9 @@ int main()
         double energy = force(molecules);
         if (step > 0) fix.final_integrate(molecules);
         double momentum = 0;
-        for (const Molecule &one : molecules) {
-            energy += fix.kinetic_energy(one, moments);
-            momentum += one.angmom[2];
+        for (const Molecule &molecule : molecules) {
+            energy += fix.kinetic_energy(molecule, moments);
+            momentum += molecule.angmom[2];
         }
         if (step == 0) {
             first = energy;
