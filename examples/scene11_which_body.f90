@@ -145,7 +145,7 @@ program scene11_which_body
     real(wp) :: t(sights), seen(4, sights), moments(3), m(3), q(4), covariance(unknowns, unknowns), left
     real(wp) :: error(unknowns), turn(4), mean_square(unknowns), residuals
     integer(int64) :: seed
-    integer :: k, most, iterations
+    integer :: i, k, most, iterations
 
     t = [(0.5_wp*k, k=1, sights)]
     seed = 99
@@ -164,16 +164,13 @@ program scene11_which_body
         if (k == 1) then
             print '(a,3f9.5)', 'true momentum', true_m
             print '(a,3f9.5)', 'fitted       ', m
-            print '(a,3f9.5)', '+-           ', [(sigma*sqrt(covariance(most + 1, most + 1)), most=0, 2)]
+            print '(a,3f9.5)', '+-           ', [(sigma*sqrt(covariance(i, i)), i=1, 3)]
             print '(a,3f9.5)', 'true moments ', true_moments
             print '(a,3f9.5)', 'fitted       ', moments
-            print '(a,2f9.5)', '+-           ', [(sigma*moments(most)*sqrt(covariance(most + 6, most + 6)), &
-                                                  most=1, 2)]
-            most = 0
+            print '(a,2f9.5)', '+-           ', [(sigma*moments(i)*sqrt(covariance(i + 6, i + 6)), i=1, 2)]
         end if
         most = max(most, iterations)
-        mean_square = mean_square + [(error(iterations)**2/(sigma**2*covariance(iterations, iterations)), &
-                                      iterations=1, unknowns)]/draws
+        mean_square = mean_square + [(error(i)**2/(sigma**2*covariance(i, i)), i=1, unknowns)]/draws
         residuals = residuals + left/(sigma**2*(3*sights - unknowns)*draws)
     end do
     print '(a,i0,a)', 'at most ', most, ' iterations'

@@ -77,7 +77,7 @@ contains
             if (k*few == 1000) shown(2) = growth/t
         end do
         shown(3) = growth/t
-        print '(a24,3f11.2)', name, shown
+        print '(a,t25,3f11.2)', name, shown
     end subroutine exponents
 
 end module frb_chaos
@@ -108,8 +108,8 @@ end program scene12_how_chaotic
 
 ! Output:
 !   exponent after steps:           100       1000      10000
-!   free body       0.24       0.05       0.01
-!   Lagrange top       0.16       0.04       0.01
-!   heavy top       0.23       0.13       0.11
-!   Hyperion       0.12       0.11       0.14
-!   Hyperion, spun up       0.33       0.11       0.02
+!   free body                      0.24       0.05       0.01
+!   Lagrange top                   0.16       0.04       0.01
+!   heavy top                      0.23       0.13       0.11
+!   Hyperion                       0.12       0.11       0.14
+!   Hyperion, spun up              0.33       0.11       0.02

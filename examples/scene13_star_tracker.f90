@@ -87,10 +87,10 @@ program scene13_star_tracker
 end program scene13_star_tracker
 
 ! Output:
-!   time   error of m   predicted   error of q [rad]   predicted
-!   5.0     8.4E-04     4.4E-04        1.4E-03        8.9E-04
-!   10.0     3.4E-04     4.1E-04        7.7E-04        7.0E-04
-!   15.0     1.9E-04     3.1E-04        7.2E-04        5.6E-04
-!   20.0     9.8E-05     1.8E-04        3.5E-04        4.3E-04
-!   25.0     1.2E-04     3.0E-04        4.8E-04        4.8E-04
-!   30.0     4.9E-05     1.6E-04        4.4E-04        3.6E-04
+!    time   error of m   predicted   error of q [rad]   predicted
+!     5.0     8.4E-04     4.4E-04        1.4E-03        8.9E-04
+!    10.0     3.4E-04     4.1E-04        7.7E-04        7.0E-04
+!    15.0     1.9E-04     3.1E-04        7.2E-04        5.6E-04
+!    20.0     9.8E-05     1.8E-04        3.5E-04        4.3E-04
+!    25.0     1.2E-04     3.0E-04        4.8E-04        4.8E-04
+!    30.0     4.9E-05     1.6E-04        4.4E-04        3.6E-04
