@@ -12,7 +12,7 @@ module frb_flow_samples
     implicit none
     private
 
-    public :: stream, sample, random_samples, true_case, advanced, made_finite, not_a_number, same, &
+    public :: stream, sample, random_samples, true_case, advanced, made_finite, not_a_number, same_bits, &
         near_separatrix, defect, diagonal, no_turn, no_rotation
 
     real(wp), parameter :: no_turn(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
@@ -182,13 +182,13 @@ contains
     end function not_a_number
 
     !> Equal to the last bit, NaN and signs of zeros included.
-    pure function same(x, y) result(equal)
+    pure function same_bits(x, y) result(equal)
         real(wp), intent(in) :: x(:), y(:)
         logical :: equal
 
         equal = size(x) == size(y)
         if (equal) equal = all(transfer(x, [0_int64]) == transfer(y, [0_int64]))
-    end function same
+    end function same_bits
 
     !> Distance of a state (m, q) from the orbit of (m0, identity): error of the norm of q, relative errors of
     !> the norm of m, the energy, and the momentum in space. All numbers finite and far from overflow.

@@ -1,7 +1,7 @@
 !> free_flow: refused input leaves the state untouched, in batches the state of the refused bodies only.
 module frb_test_flow_batches
     use frb_checks, only: tally, largest
-    use frb_flow_samples, only: stream, advanced, made_finite, not_a_number, same, no_rotation
+    use frb_flow_samples, only: stream, advanced, made_finite, not_a_number, same_bits, no_rotation
     use frb_free_flow, only: free_flow, rigid_body
     use frb_kinds, only: wp
     use frb_status, only: status_ok, status_bad_moments, status_bad_tensor, status_bad_momentum, &
@@ -109,19 +109,19 @@ contains
         if (alone) then
             m = m_in
             call free_flow(body, h, m, stat)
-            right = right .and. stat == status .and. same(m, m_in)
+            right = right .and. stat == status .and. same_bits(m, m_in)
         end if
         if (by_quaternion) then
             m = m_in
             q = q_in
             call free_flow(body, h, m, q, stat)
-            right = right .and. stat == status .and. same(m, m_in) .and. same(q, q_in)
+            right = right .and. stat == status .and. same_bits(m, m_in) .and. same_bits(q, q_in)
         end if
         if (alone .or. .not. by_quaternion) then
             m = m_in
             a = a_in
             call free_flow(body, h, m, a, stat)
-            right = right .and. stat == status .and. same(m, m_in) .and. same([a], [a_in])
+            right = right .and. stat == status .and. same_bits(m, m_in) .and. same_bits([a], [a_in])
         end if
     end function refused
 
@@ -178,9 +178,9 @@ contains
         q = spread(q0, 2, n)
         call free_flow(bodies, not_a_number(1), m, q, stat)
         call t%ok('a-batch-refuses-a-time-that-is-not-finite', stat == status_bad_time &
-                  .and. same([m], [m_in]) .and. same([q], [spread(q0, 2, n)]))
+                  .and. same_bits([m], [m_in]) .and. same_bits([q], [spread(q0, 2, n)]))
         call free_flow(rigid_body([1.0_wp, 2.0_wp, 0.0_wp]), 1.0_wp, m, stat)
-        call t%ok('a-batch-refuses-its-only-body', stat == status_bad_moments .and. same([m], [m_in]))
+        call t%ok('a-batch-refuses-its-only-body', stat == status_bad_moments .and. same_bits([m], [m_in]))
 
     contains
 
@@ -189,7 +189,7 @@ contains
 
             do j = 1, n
                 if (bad(j)) then
-                    stays = stays .and. same(m(:, j), m_in(:, j)) .and. same(q(:, j), q_in(:, j))
+                    stays = stays .and. same_bits(m(:, j), m_in(:, j)) .and. same_bits(q(:, j), q_in(:, j))
                 else
                     alone = advanced(bodies(j)%moments(), m_in(:, j), h, q_in(:, j))
                     ! The angle turned is of size h.
@@ -224,7 +224,7 @@ contains
         call free_flow(body, 1.0_wp, m(:, :4), q, stat(6))
         call free_flow(bodies, 1.0_wp, m(:, :4), q, stat(7))
         call t%ok('arrays-that-do-not-match-are-refused', all(stat == status_bad_count))
-        call t%ok('arrays-that-do-not-match-are-left-alone', same([m, q], [m_kept, q_kept]))
+        call t%ok('arrays-that-do-not-match-are-left-alone', same_bits([m, q], [m_kept, q_kept]))
     end subroutine check_counts
 
 end module frb_test_flow_batches

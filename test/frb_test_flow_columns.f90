@@ -1,11 +1,10 @@
 !> More ways to call free_flow for many bodies: columns, each body with its own time, matrices, bodies by
 !> tensor in blocks. Each is compared with a call that other suites test.
 module frb_test_flow_columns
-    use, intrinsic :: iso_fortran_env, only: int64
     use frb, only: wp, rigid_body, free_flow, free_flow_columns, quat_to_matrix, status_ok, &
         status_bad_momentum, status_bad_attitude, status_bad_time, status_bad_count, status_bad_moments
     use frb_checks, only: tally, largest, worst_of
-    use frb_flow_samples, only: stream, no_rotation
+    use frb_flow_samples, only: stream, no_rotation, same_bits
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan, ieee_positive_inf
     implicit none
     private
@@ -62,14 +61,6 @@ contains
             some%q(:, i) = q
         end do
     end subroutine draw
-
-    !> Equal to the last bit, NaN included.
-    pure function same(x, y) result(equal)
-        real(wp), intent(in) :: x(:, :), y(:, :)
-        logical :: equal
-
-        equal = all(transfer(x, [0_int64]) == transfer(y, [0_int64]))
-    end function same
 
     !> States first to last as columns, by one call for equal (1) or different bodies and times.
     subroutine by_columns(some, bodies, times, first, last, m, stat, q)
@@ -143,7 +134,7 @@ contains
                     call by_columns(some, bodies, times, first, last, mc, stat, qc)
                     bits = bits .and. stat == status_ok
                 end do
-                bits = bits .and. same(mc, m) .and. same(qc, q)
+                bits = bits .and. same_bits([mc], [m]) .and. same_bits([qc], [q])
             end do
             call t%ok('columns-give-the-bits-of-rows: '//trim(names(form)), bits)
             ! Without attitude the momenta are the same to a unit in the last place of |m| = 1.
@@ -214,7 +205,7 @@ contains
             do i = 1, n
                 worst = worst_of(worst, [abs(a(:, :, i) - quat_to_matrix(q(:, i)))])
             end do
-            if (stat /= status_ok .or. .not. same(m, mq)) worst = huge(worst)
+            if (stat /= status_ok .or. .not. same_bits([m], [mq])) worst = huge(worst)
         end do
         call t%at_most('matrices-turn-as-quaternions', worst, same_motion)
         a = spread(no_rotation, 3, n)
@@ -222,7 +213,8 @@ contains
         m = some%m
         call free_flow(some%body(1), 0.3_wp, m, a, stat)
         call t%ok('a-matrix-that-is-not-finite-is-refused', stat == status_bad_attitude &
-                  .and. same(m(:, 77:77), some%m(:, 77:77)) .and. same(a(:, :2, 77), no_rotation(:, :2)) &
+                  .and. same_bits(m(:, 77), some%m(:, 77)) &
+                  .and. same_bits([a(:, :2, 77)], [no_rotation(:, :2)]) &
                   .and. maxval(abs(m(:, 78) - some%m(:, 78))) > 1.0e-3_wp)
     end subroutine check_matrices
 
@@ -253,11 +245,11 @@ contains
             m = bad%m
             q = bad%q
             call by_columns(bad, n, n, 1, n, m, stat, q)
-            right = right .and. stat == expected .and. same(m(:, i:i), bad%m(:, i:i)) &
-                .and. same(q(:, i:i), bad%q(:, i:i))
+            right = right .and. stat == expected .and. same_bits(m(:, i), bad%m(:, i)) &
+                .and. same_bits(q(:, i), bad%q(:, i))
             m(:, i) = good_m(:, i)
             q(:, i) = good_q(:, i)
-            right = right .and. same(m, good_m) .and. same(q, good_q)
+            right = right .and. same_bits([m], [good_m]) .and. same_bits([q], [good_q])
         end do
         call t%ok('refused-columns-stay-and-the-others-go-on', right)
     end subroutine check_refused
@@ -288,7 +280,8 @@ contains
         call free_flow(some%body, some%h(:1), m, q, stat(10))
         call free_flow_columns(some%body(:1), some%h, x(:, 1), x(:, 2), x(:, 3), stat=stat(11))
         call t%ok('sizes-that-do-not-match-are-refused', all(stat == status_bad_count))
-        call t%ok('and-left-alone', same(m, some%m) .and. same(q, some%q) .and. same(transpose(x), some%m))
+        call t%ok('and-left-alone', same_bits([m], [some%m]) .and. same_bits([q], [some%q]) &
+                  .and. same_bits([transpose(x)], [some%m]))
     end subroutine check_counts
 
 end module frb_test_flow_columns

@@ -1,7 +1,7 @@
 !> free_flow of numbers of any size: other units, extreme momenta, moments and times, and none at all.
 module frb_test_flow_scales
     use frb_checks, only: tally, largest, worst_of
-    use frb_flow_samples, only: stream, advanced, same, defect, no_rotation
+    use frb_flow_samples, only: stream, advanced, same_bits, defect, no_rotation
     use frb_free_flow, only: free_flow, rigid_body
     use frb_kinds, only: wp
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
@@ -139,8 +139,8 @@ contains
             many_m = spread(m0, 2, 33)
             many_q = spread(q0, 2, 33)
             call free_flow(body, h, many_m, many_q)
-            call t%ok('nothing-moves-in-a-time-of-'//trim(names(i)), same([m, q], [m0, q0]) .and. &
-                      same([many_m, many_q], &
+            call t%ok('nothing-moves-in-a-time-of-'//trim(names(i)), same_bits([m, q], [m0, q0]) .and. &
+                      same_bits([many_m, many_q], &
                            [spread(m0, 2, 33), spread(q0, 2, 33)]))
         end do
         m = 0.0_wp
@@ -153,9 +153,9 @@ contains
         call free_flow(body, 3.0_wp, m, q, stat(2))
         call free_flow(body, 3.0_wp, m, a, stat(3))
         call free_flow(body, 3.0_wp, many_m, many_q, stat(4))
-        call t%ok('no-momentum-stays-none', same(m, [0.0_wp, -0.0_wp, 0.0_wp]) .and. &
-                  same([many_m], [spread(m, 2, 33)]))
-        call t%ok('no-momentum-is-no-turn', same([q, reshape(a, [9]), reshape(many_q, [132])], &
+        call t%ok('no-momentum-stays-none', same_bits(m, [0.0_wp, -0.0_wp, 0.0_wp]) .and. &
+                  same_bits([many_m], [spread(m, 2, 33)]))
+        call t%ok('no-momentum-is-no-turn', same_bits([q, reshape(a, [9]), reshape(many_q, [132])], &
                                                  [q0, reshape(no_rotation, [9]), &
                                                   reshape(spread(q0, 2, 33), [132])]))
         call t%ok('no-momentum-is-no-error', all(stat == 0))

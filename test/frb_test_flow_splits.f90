@@ -1,7 +1,7 @@
 !> free_flow: results of a batch do not depend on how it is split.
 module frb_test_flow_splits
     use frb_checks, only: tally
-    use frb_flow_samples, only: stream, not_a_number, same
+    use frb_flow_samples, only: stream, not_a_number, same_bits
     use frb_free_flow, only: free_flow, rigid_body
     use frb_kinds, only: wp
     use frb_rotations, only: quat_to_matrix
@@ -55,7 +55,7 @@ contains
         call advance_in_parts(bodies(:1), n, 1.0e74_wp, m1, q1)
         call advance_in_parts(bodies(:1), 7, 1.0e74_wp, m, q)
         call t%ok('smallest-numbers-give-the-same-bits-however-split', &
-                  same([m], [m1]) .and. same([q], [q1]))
+                  same_bits([m], [m1]) .and. same_bits([q], [q1]))
     end subroutine check_splits
 
     !> Bodies and states of all sorts: extreme numbers, tensors, symmetric bodies; some that are refused.
@@ -110,13 +110,13 @@ contains
             call free_flow(bodies, h, m2, stat)
         end if
         do i = 1, size(m, 2)
-            if (mod(i, 50) /= 9) alone = alone .and. same(m2(:, i), m1(:, i))
+            if (mod(i, 50) /= 9) alone = alone .and. same_bits(m2(:, i), m1(:, i))
         end do
         do i = 1, size(lengths)
             m2 = m
             q2 = q
             call advance_in_parts(bodies, lengths(i), h, m2, q2)
-            equal = equal .and. same([m2], [m1]) .and. same([q2], [q1])
+            equal = equal .and. same_bits([m2], [m1]) .and. same_bits([q2], [q1])
         end do
     end subroutine compare_splits
 

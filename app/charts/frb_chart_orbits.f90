@@ -49,7 +49,7 @@ contains
             do side = -points, points
                 m = start
                 call free_flow(body, side*0.3_wp, m)
-                call put(file, m)
+                call put_point(file, m)
             end do
             call file%end_block()
         end do
@@ -64,7 +64,7 @@ contains
                 h = real(period, wp)/points
                 m = start
                 do k = 0, points
-                    call put(file, m)
+                    call put_point(file, m)
                     call free_flow(body, h, m)
                 end do
                 call file%end_block()
@@ -118,7 +118,7 @@ contains
     end subroutine plot_flips
 
     !> One point of a curve on the sphere.
-    subroutine put(file, m)
+    subroutine put_point(file, m)
         type(chart_file), intent(inout) :: file
         real(wp), intent(in) :: m(3)
         real(wp) :: seen(3)
@@ -126,7 +126,7 @@ contains
         seen = view(m)
         write (file%line, '(2f9.5,i3)') seen(1:2), merge(1, 0, seen(3) > 0.0_wp)
         call file%put()
-    end subroutine put
+    end subroutine put_point
 
     !> Right, up and towards the eye, for an eye in the direction (3, 2, 2) with axis 3 upright.
     pure function view(m) result(seen)

@@ -32,7 +32,7 @@ contains
             'scalar/dop853, fg6a/srkn14, fg6b/aba864', file)
         do number = 1, 2
             do i = 1, size(durations)
-                call race(options, one_top(number), durations(i), file)
+                call time_solvers(options, one_top(number), durations(i), file)
                 call progress(options, 'ratios', 2*(number - 1) + i, 4)
             end do
         end do
@@ -40,7 +40,7 @@ contains
     end subroutine chart_ratios
 
     !> All solvers and settings on one top.
-    subroutine race(options, top, span, file)
+    subroutine time_solvers(options, top, span, file)
         type(settings), intent(in) :: options
         type(top_at_start), intent(in) :: top
         integer, intent(in) :: span
@@ -79,7 +79,7 @@ contains
         do k = 1, size(errors_wanted)
             call row(top, span, errors_wanted(k), errors, times, file)
         end do
-    end subroutine race
+    end subroutine time_solvers
 
     !> The k-th of the finer settings: a tolerance, or a step.
     pure function finer_setting(which, top, k) result(setting)

@@ -49,7 +49,7 @@ contains
         n = 0
         last(0) = 0
         do s = 1, size(scenes)
-            call enter(scenes(s), works, attempts, n)
+            call add_attempts(scenes(s), works, attempts, n)
             last(s) = n
         end do
         allocate (ns(n, merge(5, 9, options%quick)))
@@ -89,7 +89,7 @@ contains
     end function all_scenes
 
     !> Adds every method that can play the scene, with its workload.
-    subroutine enter(what, works, attempts, n)
+    subroutine add_attempts(what, works, attempts, n)
         type(scene), intent(in) :: what
         type(workload), intent(inout) :: works(:)
         type(attempt), intent(inout) :: attempts(:)
@@ -114,7 +114,7 @@ contains
             works(n) = new_workload(methods(i), what%moments, what%m0, what%t/steps, what%bodies)
             works(n)%nsteps = steps
         end do
-    end subroutine enter
+    end subroutine add_attempts
 
     !> The rows of a scene, the fastest first.
     subroutine write_rows(file, what, attempts, ns)

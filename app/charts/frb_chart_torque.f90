@@ -229,7 +229,7 @@ contains
         do i = 1, 3
             steps(i) = 48
             do k = 1, 60
-                call go(i)
+                call run_to_end(i)
                 if (stat == status_ok) then
                     if (distance(m, q, m_end, q_end) <= bound) exit
                 end if
@@ -243,7 +243,7 @@ contains
                 rounds = max(1, 20000/steps(i))
                 start = clock(.false.)
                 do pass = 1, rounds
-                    call go(i)
+                    call run_to_end(i)
                 end do
                 seconds(r, i) = (clock(.false.) - start)/rounds
             end do
@@ -255,7 +255,7 @@ contains
 
     contains
 
-        subroutine go(which)
+        subroutine run_to_end(which)
             integer, intent(in) :: which
 
             m = item%m0
@@ -267,7 +267,7 @@ contains
                 call integrate(item%body, schemes(which), item%top, t/steps(which), steps(which), m, q, &
                                stat=stat)
             end if
-        end subroutine go
+        end subroutine run_to_end
 
     end subroutine time_to_ten_digits
 

@@ -30,10 +30,10 @@ module frb_driver_watch
         procedure :: begin_step
         procedure :: end_step
         procedure :: finish
-        procedure, private :: see
-        procedure, private :: see_matrix
-        procedure, private :: see_quaternion
-        generic :: note => see_matrix, see_quaternion
+        procedure, private :: note_record
+        procedure, private :: note_matrix
+        procedure, private :: note_quaternion
+        generic :: note => note_matrix, note_quaternion
         procedure, private :: show_progress
     end type run_watch
 
@@ -74,7 +74,7 @@ contains
     end subroutine end_step
 
     !> Watches a record with the attitude as a matrix.
-    subroutine see_matrix(self, m, attitude, moments)
+    subroutine note_matrix(self, m, attitude, moments)
         class(run_watch), intent(inout) :: self
         real(wp), intent(in) :: m(3), attitude(3, 3), moments(3)
         real(wp) :: square(3, 3)
@@ -84,19 +84,19 @@ contains
         do i = 1, 3
             square(i, i) = square(i, i) - 1
         end do
-        call self%see(m, matmul(attitude, m), moments, attitude(:, 3), maxval(abs(square)))
-    end subroutine see_matrix
+        call self%note_record(m, matmul(attitude, m), moments, attitude(:, 3), maxval(abs(square)))
+    end subroutine note_matrix
 
     !> Watches a record with the attitude as a quaternion.
-    subroutine see_quaternion(self, m, q, moments)
+    subroutine note_quaternion(self, m, q, moments)
         class(run_watch), intent(inout) :: self
         real(wp), intent(in) :: m(3), q(4), moments(3)
 
-        call self%see(m, quat_rotate(q, m), moments, [0.0_wp, 0.0_wp, 0.0_wp], abs(norm2(q) - 1))
-    end subroutine see_quaternion
+        call self%note_record(m, quat_rotate(q, m), moments, [0.0_wp, 0.0_wp, 0.0_wp], abs(norm2(q) - 1))
+    end subroutine note_quaternion
 
     !> Compares a record with the first one.
-    subroutine see(self, m, space, moments, axis, defect)
+    subroutine note_record(self, m, space, moments, axis, defect)
         class(run_watch), intent(inout) :: self
         real(wp), intent(in) :: m(3), moments(3)
         real(wp), intent(in) :: space(3)    !! Q m
@@ -122,7 +122,7 @@ contains
         half = merge(1, 2, self%done <= self%steps/2)
         self%energy_drift(half) = max(self%energy_drift(half), abs(kinetic + potential - self%energy0))
         self%defect = max(self%defect, defect)
-    end subroutine see
+    end subroutine note_record
 
     !> Ends a run: the output gets its name, then a summary goes to standard output, or to standard error
     !> where standard output has the records.
