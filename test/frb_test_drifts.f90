@@ -203,8 +203,8 @@ contains
 
     end subroutine test_tensors
 
-    !> Linear rotors, by moments and by a tensor, move by every drift as by the free flow; a momentum along the
-    !> axis is refused.
+    !> Linear rotors, by moments and by a tensor, move by every drift as by the free flow; a momentum along
+    !> the axis is refused.
     subroutine test_linear_rotors(t)
         type(tally), intent(inout) :: t
         character(11), parameter :: names(3) = ['frb_step   ', 'quat_step  ', 'quat_step:7']
@@ -218,7 +218,8 @@ contains
 
         scheme = splitting_scheme('srkn14')
         do k = 1, 2
-            r = quat_to_matrix(merge([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], [0.1_wp, -0.7_wp, 0.5_wp, 0.5_wp], k == 1))
+            r = quat_to_matrix(merge([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], [0.1_wp, -0.7_wp, 0.5_wp, 0.5_wp], &
+                                     k == 1))
             tensor = matmul(r*spread(moments, 1, 3), transpose(r))
             if (k == 1) rotor = rigid_body(moments)
             if (k == 2) rotor = rigid_body((tensor + transpose(tensor))/2)

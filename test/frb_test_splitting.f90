@@ -280,7 +280,8 @@ contains
             call monitor%observe(int(i, int64), 0.0_wp, item%m0, item%q0, stop_here)
         end do
         call t%ok('monitor-tells-that-there-is-no-energy', ieee_is_nan(monitor%energy_error))
-        call t%close_to('monitor-tells-the-other-errors', monitor%norm_error, abs(norm_defect(item%q0)), 0.0_wp)
+        call t%close_to('monitor-tells-the-other-errors', monitor%norm_error, abs(norm_defect(item%q0)), &
+                        0.0_wp)
     end subroutine test_invariants
 
     !> Compensated runs: rounding errors are carried over, so none of them accumulate.

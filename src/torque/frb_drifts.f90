@@ -142,8 +142,8 @@ contains
         end if
     end subroutine advance_by_quaternion
 
-    !> The constants of the body. A linear rotor moves as a sphere of its moment, which the paper's steps take;
-    !> rounding errors of m along its axis are removed, more is refused.
+    !> The constants of the body. A linear rotor moves as a sphere of its moment, which the paper's steps
+    !> take; rounding errors of m along its axis are removed, more is refused.
     pure subroutine prepare(body, m, core, stat)
         type(rigid_body), intent(in) :: body
         real(wp), intent(inout) :: m(3)
