@@ -127,14 +127,13 @@ contains
         nullify (q_of)
         if (c_associated(q)) call c_f_pointer(q, q_of, [ldq, n])
         bodies = merge(1, int(n), ldb == 0)
-        packed = (ldb == 0 .or. ldb == body_doubles) .and. ldm == 3
-        if (c_associated(q)) packed = packed .and. ldq == 4
+        packed = ldb == 0 .or. ldb == body_doubles
         if (packed) then
             call c_f_pointer(body, core, [bodies])
             packed = all_usable(core)
         end if
         if (packed) then
-            call flow_many(core, bodies, ldb == 0, [h], 1, int(n), m_of, code, q_of)
+            call flow_many(core, ldb == 0, [h], m_of, code, q_of)
         else
             call c_f_pointer(body, words, [max(ldb, int(body_doubles, c_size_t)), int(bodies, c_size_t)])
             call flow_strided(words, ldb == 0, h, m_of, code, q_of)
@@ -142,7 +141,7 @@ contains
         stat = int(code, c_int)
     end function c_flow_many
 
-    !> The flow of n bodies that are not packed, or were not made: bodies and states are copied in chunks.
+    !> The flow of n bodies that are not packed, or were not made: the bodies are copied in chunks.
     subroutine flow_strided(words, alike, h, m, code, q)
         real(c_double), intent(in), target :: words(:, :)   !! bodies: one, or as many as states
         logical, intent(in) :: alike                        !! the first is meant for all
@@ -152,31 +151,25 @@ contains
         real(c_double), intent(inout), optional :: q(:, :)  !! the first 4 rows
         type(body_core), pointer :: given
         type(body_core) :: part(chunk)
-        real(c_double) :: part_m(3, chunk), part_q(4, chunk)
-        integer :: first, last, count, bodies, code_here, i
+        integer :: first, last, bodies, code_here, i
 
         code = status_ok
         bodies = 1
         do first = 1, size(m, 2), chunk
             last = min(first + chunk - 1, size(m, 2))
-            count = last - first + 1
             if (size(words, 2) > 1 .or. first == 1) then
-                bodies = min(count, size(words, 2))
+                bodies = min(last - first + 1, size(words, 2))
                 do i = 1, bodies
                     call c_f_pointer(c_loc(words(1, first + i - 1)), given)
                     part(i) = body_core()
                     if (usable(given)) part(i) = given
                 end do
             end if
-            part_m(:, :count) = m(:3, first:last)
             if (present(q)) then
-                part_q(:, :count) = q(:4, first:last)
-                call flow_many(part, bodies, alike, [h], 1, count, part_m, code_here, part_q)
-                q(:4, first:last) = part_q(:, :count)
+                call flow_many(part(:bodies), alike, [h], m(:, first:last), code_here, q(:, first:last))
             else
-                call flow_many(part, bodies, alike, [h], 1, count, part_m, code_here)
+                call flow_many(part(:bodies), alike, [h], m(:, first:last), code_here)
             end if
-            m(:3, first:last) = part_m(:, :count)
             code = max(code, code_here)
         end do
     end subroutine flow_strided

@@ -21,7 +21,7 @@ module frb_flow_blocks
         real(wp) :: lane(lanes)             !! see body_core; 0: the lane does not move here
         logical :: all_plain                !! all lanes have plain numbers
         integer :: axes_are                 !! same_axes, shifted_axes, turned_axes
-        integer :: column(3)                !! place of each body axis in the columns of the momenta
+        integer :: column(3)                !! place of each body axis in the columns of increments
         real(wp) :: axes(lanes, 3, 3)       !! turned: (:, i, k), component along body axis i of cyclic axis k
     end type block_of_bodies
 
@@ -37,31 +37,34 @@ contains
 
     !> The constants of `count` bodies from the first, each with its time; lanes up to a whole vector repeat
     !> the last one. Lanes that are not plain, those of refused bodies among them, have constants 0.
-    pure subroutine set_bodies(body, bodies, h, times, first, count, block)
-        integer, intent(in) :: bodies, times, first, count
+    pure subroutine set_bodies(body, alike, h, first, count, block)
         type(body_core), intent(in) :: body(:)
-        real(wp), intent(in) :: h(times)
+        logical, intent(in) :: alike
+        real(wp), intent(in) :: h(:)
+        integer, intent(in) :: first, count
         type(block_of_bodies), intent(inout) :: block
         real(wp) :: t(lanes), axis
         integer(int64) :: plain, turned, apart
-        integer :: l, full, given
+        integer :: l, full, last
 
         full = whole(count)
-        given = merge(1, full, max(bodies, times) == 1)
-        call gather(body, bodies, first, count, given, block)
-        if (times == 1) then
-            t(:given) = merge(0.5_wp*h(1), 0.0_wp, abs(h(1)) < plain_largest)
+        call gather(body, first, count, full, block)
+        if (size(h) == 1) then
+            t(:full) = merge(0.5_wp*h(1), 0.0_wp, abs(h(1)) < plain_largest)
         else
-            t(:count) = merge(h(first:first + count - 1), 0.0_wp, ieee_is_finite(h(first:first + count - 1)))
+            last = first + count - 1
+            t(:count) = merge(h(first:last), 0.0_wp, ieee_is_finite(h(first:last)))
             t(count + 1:full) = t(count)
             ! A time of 0 goes on as one that is too large does: by itself.
             t(:full) = merge(0.5_wp*t(:full), 0.0_wp, abs(t(:full)) < plain_largest)
         end if
-        call scale_by_time(given, t, block%lane, block%of, plain)
-        block%all_plain = plain == given
+        call scale_by_time(full, t, block%lane, block%of, plain)
+        block%of%alike = alike
+        if (alike) call set_polynomial(body(1), full, t, block%of)
+        block%all_plain = plain == full
         turned = 0
         apart = 0
-        do l = 1, given
+        do l = 1, full
             axis = abs(block%lane(l))
             turned = turned + merge(1_int64, 0_int64, axis > 3.5_wp)
             apart = apart + merge(1_int64, 0_int64, abs(axis - abs(block%lane(1))) > 0.5_wp)
@@ -69,10 +72,9 @@ contains
         block%axes_are = merge(same_axes, merge(shifted_axes, turned_axes, turned == 0), apart + turned == 0)
         block%column = [1, 2, 3]
         if (block%axes_are == same_axes) block%column = 1 + modulo([4, 5, 6] - int(abs(block%lane(1))), 3)
-        if (given < full) call fill(full, block)
         if (block%axes_are /= turned_axes) return
         do l = 1, full
-            associate (one => body(min(bodies, first + min(l, count) - 1)))
+            associate (one => body(min(size(body), first + min(l, count) - 1)))
                 if (one%parity > 0) then
                     block%axes(l, :, :) = one%axes(:, one%order)
                 else
@@ -82,52 +84,32 @@ contains
         end do
     end subroutine set_bodies
 
-    !> Constants as columns, of `count` bodies from number `first` on or of the only body; the last one is
-    !> repeated up to lane `given`.
-    pure subroutine gather(body, bodies, first, count, given, block)
-        integer, intent(in) :: bodies, first, count, given
+    !> Constants as columns, of the only body or of `count` bodies from number `first` on.
+    pure subroutine gather(body, first, count, full, block)
         type(body_core), intent(in) :: body(:)
+        integer, intent(in) :: first, count, full
         type(block_of_bodies), intent(inout) :: block
-        integer :: l
+        integer :: l, known, before
 
-        do l = 1, given
-            associate (one => body(min(bodies, first + min(l, count) - 1)))
-                block%lane(l) = one%lane
-                block%of%a(l) = one%alpha
-                block%of%b(l) = one%beta
-                block%of%g(l) = one%gamma
-                block%of%first(l) = one%a(1)
-                block%of%last(l) = one%a(3)
-            end associate
-        end do
-        if (block%of%alike) block%of%rho = polynomial_of_rho(body(1)%a)
-    end subroutine gather
-
-    !> Copies the constants of the first lane to all others.
-    pure subroutine fill(full, block)
-        integer, intent(in) :: full
-        type(block_of_bodies), intent(inout) :: block
-        integer :: l, i
-
-        associate (of => block%of, lane => block%lane(1))
-            do l = 0, full - 1, vector
-                block%lane(l + 1:l + vector) = lane
-                of%a(l + 1:l + vector) = of%a(1)
-                of%b(l + 1:l + vector) = of%b(1)
-                of%g(l + 1:l + vector) = of%g(1)
-                of%ag(l + 1:l + vector) = of%ag(1)
-                of%ab(l + 1:l + vector) = of%ab(1)
-                of%bg(l + 1:l + vector) = of%bg(1)
-                of%first(l + 1:l + vector) = of%first(1)
-                of%base(l + 1:l + vector) = of%base(1)
-                of%last(l + 1:l + vector) = of%last(1)
-                of%rate(l + 1:l + vector) = of%rate(1)
-                do i = 1, size(of%above, 2)
-                    of%above(l + 1:l + vector, i) = of%above(1, i)
-                end do
+        known = merge(1, count, size(body) == 1)
+        before = merge(0, first - 1, size(body) == 1)
+        associate (of => block%of)
+            do l = 1, known
+                block%lane(l) = body(before + l)%lane
+                of%a(l) = body(before + l)%alpha
+                of%b(l) = body(before + l)%beta
+                of%g(l) = body(before + l)%gamma
+                of%first(l) = body(before + l)%a(1)
+                of%last(l) = body(before + l)%a(3)
             end do
+            block%lane(known + 1:full) = block%lane(known)
+            of%a(known + 1:full) = of%a(known)
+            of%b(known + 1:full) = of%b(known)
+            of%g(known + 1:full) = of%g(known)
+            of%first(known + 1:full) = of%first(known)
+            of%last(known + 1:full) = of%last(known)
         end associate
-    end subroutine fill
+    end subroutine gather
 
     !> The constant rho of frb_flow_lanes as a polynomial in u and e to degree 4: coefficients of u to u^4, of
     !> e to e u^3, of e^2 to e^2 u^2, of e^3, e^3 u and of e^4.
@@ -167,6 +149,20 @@ contains
                         + s23*(31/525.0_wp)
     end function polynomial_of_rho
 
+    !> What the shortest steps of n equal bodies need.
+    pure subroutine set_polynomial(body, n, t, of)
+        type(body_core), intent(in) :: body
+        integer, intent(in) :: n
+        real(wp), intent(in) :: t(n)
+        type(lane_bodies), intent(inout) :: of
+
+        of%rho = polynomial_of_rho(body%a)
+        of%base(:n) = min(body%a(3), plain_largest)*t
+        of%above(:n, 1) = merge(0.0_wp, body%beta, body%lane < 0)*t
+        of%above(:n, 2) = body%alpha*t
+        of%above(:n, 3) = merge(body%beta, 0.0_wp, body%lane < 0)*t
+    end subroutine set_polynomial
+
     !> Times t, and with the axes in cyclic order, the middle moment second: of odd ones the first and the
     !> last change places. `plain` lanes turn by no angle near overflow; the others get 0.
     pure subroutine scale_by_time(n, t, lane, of, plain)
@@ -194,10 +190,6 @@ contains
             g = of%g(l)*time
             odd = lane(l) < 0
             of%rate(l) = a1
-            of%base(l) = a3
-            of%above(l, 1) = merge(0.0_wp, b, odd)
-            of%above(l, 2) = a
-            of%above(l, 3) = merge(b, 0.0_wp, odd)
             of%first(l) = merge(a3, a1, odd)
             of%last(l) = merge(a1, a3, odd)
             of%a(l) = merge(-g, a, odd)

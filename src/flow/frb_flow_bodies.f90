@@ -1,5 +1,4 @@
-!> Many free bodies at once: the bodies of a block share SIMD lanes, blocks are shared among threads. Blocks
-!> have states as columns: states in rows are copied; states in columns that fill whole vectors move in place.
+!> Many free bodies at once: the bodies of a block share SIMD lanes, blocks are shared among threads.
 module frb_flow_bodies
     use frb_flow_blocks, only: block_of_bodies, set_bodies, step_lanes, whole
     use frb_flow_lanes, only: lanes, workspace
@@ -10,354 +9,215 @@ module frb_flow_bodies
     use frb_kinds, only: wp
     use frb_status, only: status_ok, status_bad_time
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_is_nan
-    use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
     public :: flow_many, flow_columns
 
-    logical, parameter :: none(lanes) = .false.
-
 contains
 
-    !> Many bodies in blocks, one per SIMD lane; body(:) holds one body for all or one for each, and so does
-    !> h(:). The blocks are independent: with -fopenmp they are shared among the threads. What becomes of a
-    !> body does not depend on the others: the same bits for any threads and parts of a batch. (So one body
-    !> takes a block too, though a call for it alone is faster.)
-    subroutine flow_many(body, bodies, alike, h, times, n, m, code, q)
-        integer, intent(in) :: bodies, times, n     !! bodies and times: 1 or n
+    !> Advances the bodies whose states are the rows m(1:3, :) and q(1:4, :), of any strides: see flow_columns.
+    subroutine flow_many(body, alike, h, m, code, q)
         type(body_core), intent(in) :: body(:)
-        logical, intent(in) :: alike                !! body(1) is meant for all, whatever n
-        real(wp), intent(in) :: h(times)
-        real(wp), intent(inout) :: m(3, n)
+        logical, intent(in) :: alike
+        real(wp), intent(in) :: h(:)
+        real(wp), intent(inout) :: m(:, :)
         integer, intent(out) :: code
-        real(wp), intent(inout), optional :: q(4, n)
-        type(block_of_bodies) :: block
-        integer :: first, count, refused
+        real(wp), intent(inout), optional :: q(:, :)
 
-        call check_many(body, bodies, h, times, code)
+        if (present(q)) then
+            call flow_columns(body, alike, h, m(1, :), m(2, :), m(3, :), code, q(1, :), q(2, :), &
+                              q(3, :), q(4, :))
+        else
+            call flow_columns(body, alike, h, m(1, :), m(2, :), m(3, :), code)
+        end if
+    end subroutine flow_many
+
+    !> Advances size(m1) bodies in blocks, one body per SIMD lane. The components of the states are vectors of
+    !> any stride: rows or columns of arrays. q0 to q3: all or none. The blocks are independent: with -fopenmp
+    !> they are shared among the threads. What becomes of a body does not depend on the others: the same bits
+    !> for any threads and parts of a batch. (So one body takes a block too, though a call for it alone is
+    !> faster.)
+    subroutine flow_columns(body, alike, h, m1, m2, m3, code, q0, q1, q2, q3)
+        type(body_core), intent(in) :: body(:)      !! one for all or one for each
+        logical, intent(in) :: alike                !! body(1) is meant for all, also for one
+        real(wp), intent(in) :: h(:)                !! one for all or one for each
+        real(wp), intent(inout) :: m1(:), m2(:), m3(:)
+        integer, intent(out) :: code                !! the largest of those of the bodies
+        real(wp), intent(inout), optional :: q0(:), q1(:), q2(:), q3(:)
+        type(block_of_bodies) :: block
+        logical :: blocks_differ
+        integer :: first, count, n, refused
+
+        code = status_ok
+        if (size(body) == 1) code = body(1)%status
+        if (size(h) == 1 .and. code == status_ok) then
+            if (.not. ieee_is_finite(h(1))) code = status_bad_time
+        end if
+        n = size(m1)
         if (code /= status_ok .or. n == 0) return
         refused = status_ok
-        block%of%alike = alike
-        if (max(bodies, times) == 1) call set_bodies(body, bodies, h, times, 1, min(n, lanes), block)
+        blocks_differ = max(size(body), size(h)) > 1
+        if (.not. blocks_differ) call set_bodies(body, alike, h, 1, min(n, lanes), block)
         !$omp parallel do if (n >= 64*lanes) firstprivate(block) private(count) reduction(max: refused)
         do first = 1, n, lanes
             count = min(lanes, n - first + 1)
-            if (max(bodies, times) > 1) call set_bodies(body, bodies, h, times, first, count, block)
-            if (present(q)) then
-                call flow_rows(body, bodies, h, times, first, count, block, m(1, first), refused, q(1, first))
-            else
-                call flow_rows(body, bodies, h, times, first, count, block, m(1, first), refused)
-            end if
-        end do
-        !$omp end parallel do
-        code = refused
-    end subroutine flow_many
-
-    !> The same with states in columns, q0 to q3 all or none: the same bits.
-    subroutine flow_columns(body, bodies, alike, h, times, n, m1, m2, m3, code, q0, q1, q2, q3)
-        integer, intent(in) :: bodies, times, n     !! bodies and times: 1 or n
-        type(body_core), intent(in) :: body(:)
-        logical, intent(in) :: alike                !! body(1) is meant for all, whatever n
-        real(wp), intent(in) :: h(times)
-        real(wp), intent(inout) :: m1(n), m2(n), m3(n)
-        integer, intent(out) :: code
-        real(wp), intent(inout), optional :: q0(n), q1(n), q2(n), q3(n)
-        type(block_of_bodies) :: block
-        type(workspace) :: work
-        real(wp) :: x(lanes, 3), y(lanes, 4)
-        logical :: served
-        integer :: first, last, count, refused
-
-        call check_many(body, bodies, h, times, code)
-        if (code /= status_ok .or. n == 0) return
-        refused = status_ok
-        block%of%alike = alike
-        if (max(bodies, times) == 1) call set_bodies(body, bodies, h, times, 1, min(n, lanes), block)
-        !$omp parallel do if (n >= 64*lanes) firstprivate(block) private(last, count, served, x, y, work) &
-        !$omp& reduction(max: refused)
-        do first = 1, n, lanes
-            last = min(first + lanes - 1, n)
-            count = last - first + 1
-            if (max(bodies, times) > 1) call set_bodies(body, bodies, h, times, first, count, block)
-            served = .false.
-            if (block%all_plain .and. count == whole(count)) then
-                if (present(q0)) then
-                    call flow_whole(count, block, .false., work, served, m1(first), m2(first), m3(first), &
-                                    q0(first), q1(first), q2(first), q3(first))
-                else
-                    call flow_whole(count, block, .false., work, served, m1(first), m2(first), m3(first))
-                end if
-            end if
-            if (served) cycle
-            x(:count, 1) = m1(first:last)
-            x(:count, 2) = m2(first:last)
-            x(:count, 3) = m3(first:last)
-            if (present(q0)) then
-                y(:count, 1) = q0(first:last)
-                y(:count, 2) = q1(first:last)
-                y(:count, 3) = q2(first:last)
-                y(:count, 4) = q3(first:last)
-            end if
-            call flow_block(body, bodies, h, times, first, count, block, present(q0), x, y, refused)
-            m1(first:last) = x(:count, 1)
-            m2(first:last) = x(:count, 2)
-            m3(first:last) = x(:count, 3)
-            if (.not. present(q0)) cycle
-            q0(first:last) = y(:count, 1)
-            q1(first:last) = y(:count, 2)
-            q2(first:last) = y(:count, 3)
-            q3(first:last) = y(:count, 4)
+            if (blocks_differ) call set_bodies(body, alike, h, first, count, block)
+            call flow_block(body, h, first, count, block, m1, m2, m3, refused, q0, q1, q2, q3)
         end do
         !$omp end parallel do
         code = refused
     end subroutine flow_columns
 
-    !> Whether the only body or the only time is refused, and so all states are.
-    pure subroutine check_many(body, bodies, h, times, code)
-        integer, intent(in) :: bodies, times
+    !> One block. Bodies that the lanes cannot move are moved by flow_body.
+    subroutine flow_block(body, h, first, count, block, m1, m2, m3, refused, q0, q1, q2, q3)
         type(body_core), intent(in) :: body(:)
-        real(wp), intent(in) :: h(times)
-        integer, intent(out) :: code
-
-        code = status_ok
-        if (bodies == 1) code = body(1)%status
-        if (code /= status_ok .or. times /= 1) return
-        if (.not. ieee_is_finite(h(1))) code = status_bad_time
-    end subroutine check_many
-
-    !> One block of rows. Storing four columns as rows by vectors takes longer than by numbers: GCC shuffles
-    !> each vector four times.
-    subroutine flow_rows(body, bodies, h, times, first, count, block, m, refused, q)
-        integer, intent(in) :: bodies, times, first, count
-        type(body_core), intent(in) :: body(:)
-        real(wp), intent(in) :: h(times)
+        real(wp), intent(in) :: h(:)
+        integer, intent(in) :: first, count
         type(block_of_bodies), intent(in) :: block
-        real(wp), intent(inout) :: m(3, count)
+        real(wp), intent(inout) :: m1(:), m2(:), m3(:)
         integer, intent(inout) :: refused
-        real(wp), intent(inout), optional :: q(4, count)
-        real(wp) :: x(lanes, 3), y(lanes, 4)
-        integer :: l
-
-        do l = 1, count
-            x(l, 1) = m(1, l)
-            x(l, 2) = m(2, l)
-            x(l, 3) = m(3, l)
-        end do
-        if (present(q)) then
-            do l = 1, count
-                y(l, 1) = q(1, l)
-                y(l, 2) = q(2, l)
-                y(l, 3) = q(3, l)
-                y(l, 4) = q(4, l)
-            end do
-        end if
-        call flow_block(body, bodies, h, times, first, count, block, present(q), x, y, refused)
-        do l = 1, count
-            m(1, l) = x(l, 1)
-            m(2, l) = x(l, 2)
-            m(3, l) = x(l, 3)
-        end do
-        if (.not. present(q)) return
-        !GCC$ novector
-        do l = 1, count
-            q(1, l) = y(l, 1)
-            q(2, l) = y(l, 2)
-            q(3, l) = y(l, 3)
-            q(4, l) = y(l, 4)
-        end do
-    end subroutine flow_rows
-
-    !> One block, its states in columns with room for whole vectors. Bodies that the lanes cannot move are
-    !> moved by flow_body.
-    subroutine flow_block(body, bodies, h, times, first, count, block, with_attitude, x, y, refused)
-        integer, intent(in) :: bodies, times, first, count
-        type(body_core), intent(in) :: body(:)
-        real(wp), intent(in) :: h(times)
-        type(block_of_bodies), intent(in) :: block
-        logical, intent(in) :: with_attitude
-        real(wp), intent(inout) :: x(lanes, 3), y(lanes, 4)
-        integer, intent(inout) :: refused
+        real(wp), intent(inout), optional :: q0(:), q1(:), q2(:), q3(:)
         type(workspace) :: work
-        real(wp) :: new_x(lanes, 3), new_y(lanes, 4)
-        logical :: good(lanes), served
-        integer :: l, full
+        real(wp) :: m(lanes, 3)
+        logical :: all_moved
+        integer :: l, high, step
 
-        full = whole(count)
-        do l = count + 1, full
-            x(l, :) = x(count, :)
-            if (with_attitude) y(l, :) = y(count, :)
-        end do
-        if (block%all_plain) then
-            call flow_lanes(.false., x, y)
-            if (served) return
-            if (.not. any(is_near(work%reach(:count)))) then
-                call flow_rest(body, bodies, h, times, first, count, none, with_attitude, x, y, refused)
-                return
-            end if
+        if (present(q0)) then
+            call measure_attitudes(first, count, q0, q1, q2, q3, work%reach)
+        else
+            work%reach(:count) = 0.0_wp
         end if
-        do l = 1, full
-            good(l) = abs(block%lane(l)) > 0.5_wp .and. plain_momentum(x(l, 1), x(l, 2), x(l, 3)) > 0
-            if (good(l) .and. with_attitude) then
-                good(l) = plain_attitude(y(l, 1), y(l, 2), y(l, 3), y(l, 4)) > 0
-            end if
-            new_x(l, :) = 0.0_wp
-            new_y(l, :) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-            if (.not. good(l)) cycle
-            new_x(l, :) = x(l, :)
-            if (with_attitude) new_y(l, :) = y(l, :)
-        end do
-        call flow_lanes(.true., new_x, new_y)
-        good(:count) = good(:count) .and. is_near(work%reach(:count))
-        do l = 1, count
-            if (.not. good(l)) cycle
-            x(l, :) = new_x(l, :)
-            if (with_attitude) y(l, :) = new_y(l, :)
-        end do
-        call flow_rest(body, bodies, h, times, first, count, good, with_attitude, x, y, refused)
-
-    contains
-
-        !> The states u, v of all lanes, whole vectors or a part.
-        subroutine flow_lanes(in_part, u, v)
-            logical, intent(in) :: in_part
-            real(wp), intent(inout) :: u(lanes, 3), v(lanes, 4)
-
-            if (with_attitude) then
-                call flow_whole(full, block, in_part, work, served, u(:, 1), u(:, 2), u(:, 3), v(:, 1), &
-                                v(:, 2), v(:, 3), v(:, 4))
+        call load_momenta(first, count, whole(count), work%reach, m1, m2, m3, m)
+        if (.not. block%all_plain) call stop_lanes(whole(count), block%lane, m)
+        call step_lanes(whole(count), present(q0), block, m(:, 1), m(:, 2), m(:, 3), work, all_moved)
+        step = merge(count, 1, all_moved)
+        do l = 1, count, step
+            high = l + step - 1
+            if (all_moved .or. is_near(work%reach(l))) then
+                associate (d => work%d, w => work%w, c => block%column)
+                    call add(first, l, high, m, d(:, c(1)), d(:, c(2)), d(:, c(3)), m1, m2, m3)
+                    if (.not. present(q0)) cycle
+                    call turn_attitudes(first, l, high, work%w0, w(:, c(1)), w(:, c(2)), w(:, c(3)), &
+                                        q0, q1, q2, q3)
+                end associate
             else
-                call flow_whole(full, block, in_part, work, served, u(:, 1), u(:, 2), u(:, 3))
+                call flow_single(body, h, first + l - 1, m1, m2, m3, refused, q0, q1, q2, q3)
             end if
-        end subroutine flow_lanes
-
+        end do
     end subroutine flow_block
 
-    !> The bodies of a block that are not `done`, one after another.
-    subroutine flow_rest(body, bodies, h, times, first, count, done, with_attitude, x, y, refused)
-        integer, intent(in) :: bodies, times, first, count
-        type(body_core), intent(in) :: body(:)
-        real(wp), intent(in) :: h(times)
-        logical, intent(in) :: done(count), with_attitude
-        real(wp), intent(inout) :: x(lanes, 3), y(lanes, 4)
-        integer, intent(inout) :: refused
-        real(wp) :: m(3), q(4)
+    !> A quarter of the sums of sizes of components; `plain_largest` for NaN and for attitudes near zero.
+    pure subroutine measure_attitudes(first, count, q0, q1, q2, q3, total)
+        integer, intent(in) :: first, count
+        real(wp), intent(in) :: q0(:), q1(:), q2(:), q3(:)
+        real(wp), intent(inout) :: total(lanes)
+        real(wp) :: sizes
+        integer :: l, k
+
+        do l = 1, count
+            k = first - 1 + l
+            sizes = (0.25_wp*abs(q0(k)) + 0.25_wp*abs(q1(k))) + (0.25_wp*abs(q2(k)) + 0.25_wp*abs(q3(k)))
+            sizes = merge(plain_largest, sizes, ieee_is_nan(sizes))     ! comparing a NaN would raise a flag
+            total(l) = merge(plain_largest, 0.25_wp*sizes, sizes < plain_smallest)
+        end do
+    end subroutine measure_attitudes
+
+    !> Momenta as columns; lanes up to a whole vector repeat the last one. Where the components of the state
+    !> are not finite or near overflow, the momentum is 0: the lanes do not move it.
+    pure subroutine load_momenta(first, count, full, total, m1, m2, m3, m)
+        integer, intent(in) :: first, count, full
+        real(wp), intent(in) :: total(lanes)        !! of the attitudes
+        real(wp), intent(in) :: m1(:), m2(:), m3(:)
+        real(wp), intent(out) :: m(lanes, 3)
+        real(wp) :: x1, x2, x3, sizes
         integer :: l
 
         do l = 1, count
-            if (done(l)) cycle
-            m = x(l, :)
-            if (with_attitude) then
-                q = y(l, :)
-                call flow_single(body, bodies, h, times, first + l - 1, m, refused, q)
-                y(l, :) = q
-            else
-                call flow_single(body, bodies, h, times, first + l - 1, m, refused)
-            end if
-            x(l, :) = m
+            x1 = m1(first - 1 + l)
+            x2 = m2(first - 1 + l)
+            x3 = m3(first - 1 + l)
+            sizes = (0.25_wp*abs(x1) + 0.25_wp*abs(x2)) + (0.25_wp*abs(x3) + total(l))
+            sizes = merge(plain_largest, sizes, ieee_is_nan(sizes))
+            m(l, 1) = merge(x1, 0.0_wp, sizes < 0.25_wp*plain_largest)
+            m(l, 2) = merge(x2, 0.0_wp, sizes < 0.25_wp*plain_largest)
+            m(l, 3) = merge(x3, 0.0_wp, sizes < 0.25_wp*plain_largest)
         end do
-    end subroutine flow_rest
+        m(count + 1:full, 1) = m(count, 1)
+        m(count + 1:full, 2) = m(count, 2)
+        m(count + 1:full, 3) = m(count, 3)
+    end subroutine load_momenta
+
+    !> The lanes whose bodies or times are not plain get the momentum 0.
+    pure subroutine stop_lanes(full, lane, m)
+        integer, intent(in) :: full
+        real(wp), intent(in) :: lane(lanes)
+        real(wp), intent(inout) :: m(lanes, 3)
+        integer :: l
+
+        do l = 1, full
+            if (.not. abs(lane(l)) > 0.5_wp) m(l, :) = 0.0_wp
+        end do
+    end subroutine stop_lanes
 
     !> Body number k by itself.
-    subroutine flow_single(body, bodies, h, times, k, m, refused, q)
-        integer, intent(in) :: bodies, times, k
+    subroutine flow_single(body, h, k, m1, m2, m3, refused, q0, q1, q2, q3)
         type(body_core), intent(in) :: body(:)
-        real(wp), intent(in) :: h(times)
-        real(wp), intent(inout) :: m(3)
+        real(wp), intent(in) :: h(:)
+        integer, intent(in) :: k
+        real(wp), intent(inout) :: m1(:), m2(:), m3(:)
         integer, intent(inout) :: refused
-        real(wp), intent(inout), optional :: q(4)
+        real(wp), intent(inout), optional :: q0(:), q1(:), q2(:), q3(:)
+        real(wp) :: m(3), q(4)
         integer :: code
 
-        if (present(q)) then
-            call flow_body(body(min(bodies, k)), h(min(times, k)), m, code, q)
-        else
-            call flow_body(body(min(bodies, k)), h(min(times, k)), m, code)
-        end if
+        associate (one => body(min(size(body), k)), time => h(min(size(h), k)))
+            m = [m1(k), m2(k), m3(k)]
+            if (present(q0)) then
+                q = [q0(k), q1(k), q2(k), q3(k)]
+                call flow_body(one, time, m, code, q)
+                q0(k) = q(1)
+                q1(k) = q(2)
+                q2(k) = q(3)
+                q3(k) = q(4)
+            else
+                call flow_body(one, time, m, code)
+            end if
+        end associate
+        m1(k) = m(1)
+        m2(k) = m(2)
+        m3(k) = m(3)
         refused = max(refused, code)
     end subroutine flow_single
 
-    !> Whole vectors of lanes in columns, all plain or, served = .false., as they were. Lanes out of reach
-    !> stay behind if in_part; otherwise there is no step if there are such lanes.
-    subroutine flow_whole(n, block, in_part, work, served, m1, m2, m3, q0, q1, q2, q3)
-        integer, intent(in) :: n
-        type(block_of_bodies), intent(in) :: block
-        logical, intent(in) :: in_part
-        type(workspace), intent(inout) :: work
-        logical, intent(out) :: served
-        real(wp), intent(inout) :: m1(n), m2(n), m3(n)
-        real(wp), intent(inout), optional :: q0(n), q1(n), q2(n), q3(n)
-        integer(int64) :: many
+    !> The momenta m + d of lanes from `low` to `high`.
+    pure subroutine add(first, low, high, m, d1, d2, d3, m1, m2, m3)
+        integer, intent(in) :: first, low, high
+        real(wp), intent(in) :: m(lanes, 3), d1(lanes), d2(lanes), d3(lanes)
+        real(wp), intent(inout) :: m1(:), m2(:), m3(:)
         integer :: l
 
-        many = 0
-        do l = 1, n
-            many = many + plain_momentum(m1(l), m2(l), m3(l))
+        !GCC$ ivdep
+        do l = low, high
+            m1(first - 1 + l) = m(l, 1) + d1(l)
+            m2(first - 1 + l) = m(l, 2) + d2(l)
+            m3(first - 1 + l) = m(l, 3) + d3(l)
         end do
-        if (present(q0)) then
-            do l = 1, n
-                many = many + plain_attitude(q0(l), q1(l), q2(l), q3(l))
-            end do
-            many = many - n
-        end if
-        served = many == n
-        if (.not. served) then
-            work%reach(:n) = 0.0_wp     ! not known
-            return
-        end if
-        call step_lanes(n, present(q0), block, m1, m2, m3, work, served)
-        if (.not. (served .or. in_part)) return
-        associate (c => block%column)
-            call add(n, work%d(1, c(1)), m1)
-            call add(n, work%d(1, c(2)), m2)
-            call add(n, work%d(1, c(3)), m3)
-            if (.not. present(q0)) return
-            call turn_columns(n, work%w0, work%w(1, c(1)), work%w(1, c(2)), work%w(1, c(3)), q0, q1, q2, q3)
-        end associate
-    end subroutine flow_whole
-
-    !> 1 if the components are finite and far from overflow, else 0. Comparing a NaN would raise a flag.
-    pure function plain_momentum(m1, m2, m3) result(one)
-        real(wp), intent(in) :: m1, m2, m3
-        integer(int64) :: one
-        real(wp) :: total
-
-        total = (0.25_wp*abs(m1) + 0.25_wp*abs(m2)) + 0.25_wp*abs(m3)       ! does not overflow
-        total = merge(plain_largest, total, ieee_is_nan(total))
-        one = merge(1_int64, 0_int64, total < 0.25_wp*plain_largest)
-    end function plain_momentum
-
-    !> 1 if the components are finite, far from overflow and not all near zero, else 0.
-    pure function plain_attitude(q0, q1, q2, q3) result(one)
-        real(wp), intent(in) :: q0, q1, q2, q3
-        integer(int64) :: one
-        real(wp) :: total
-
-        total = (0.25_wp*abs(q0) + 0.25_wp*abs(q1)) + (0.25_wp*abs(q2) + 0.25_wp*abs(q3))
-        total = merge(plain_largest, total, ieee_is_nan(total))
-        total = merge(plain_largest, total, total < plain_smallest)
-        one = merge(1_int64, 0_int64, total < 0.25_wp*plain_largest)
-    end function plain_attitude
-
-    !> m + d.
-    pure subroutine add(n, d, m)
-        integer, intent(in) :: n
-        real(wp), intent(in) :: d(n)
-        real(wp), intent(inout) :: m(n)
-
-        m = m + d
     end subroutine add
 
-    !> q + q w.
-    pure subroutine turn_columns(n, w0, w1, w2, w3, q0, q1, q2, q3)
-        integer, intent(in) :: n
-        real(wp), intent(in) :: w0(n), w1(n), w2(n), w3(n)
-        real(wp), intent(inout) :: q0(n), q1(n), q2(n), q3(n)
-        integer :: l
+    !> The attitudes q + q w of lanes from `low` to `high`.
+    pure subroutine turn_attitudes(first, low, high, w0, w1, w2, w3, q0, q1, q2, q3)
+        integer, intent(in) :: first, low, high
+        real(wp), intent(in) :: w0(lanes), w1(lanes), w2(lanes), w3(lanes)
+        real(wp), intent(inout) :: q0(:), q1(:), q2(:), q3(:)
+        integer :: l, k
 
-        do l = 1, n
-            call turn(w0(l), w1(l), w2(l), w3(l), q0(l), q1(l), q2(l), q3(l))
+        !GCC$ ivdep
+        do l = low, high
+            k = first - 1 + l
+            call turn(w0(l), w1(l), w2(l), w3(l), q0(k), q1(k), q2(k), q3(k))
         end do
-    end subroutine turn_columns
+    end subroutine turn_attitudes
 
     include 'turn_formulas.inc'
 

@@ -314,7 +314,7 @@ contains
         integer :: code
 
         code = status_bad_count
-        if (size(m, 1) == 3) call flow_many([body%core], 1, .true., [h], 1, size(m, 2), m, code)
+        if (size(m, 1) == 3) call flow_many([body%core], .true., [h], m, code)
         call return_or_stop(code, 'free_flow', stat)
     end subroutine flow_momenta
 
@@ -330,7 +330,7 @@ contains
 
         code = status_bad_count
         if (size(m, 1) == 3 .and. size(q, 1) == 4 .and. size(m, 2) == size(q, 2)) then
-            call flow_many([body%core], 1, .true., [h], 1, size(m, 2), m, code, q)
+            call flow_many([body%core], .true., [h], m, code, q)
         end if
         call return_or_stop(code, 'free_flow', stat)
     end subroutine flow_quaternions
@@ -345,7 +345,7 @@ contains
 
         code = status_bad_count
         if (size(m, 1) == 3 .and. size(body) == size(m, 2)) then
-            call flow_many(cores_of(body), size(body), .false., [h], 1, size(m, 2), m, code)
+            call flow_many(cores_of(body), .false., [h], m, code)
         end if
         call return_or_stop(code, 'free_flow', stat)
     end subroutine flow_momenta_of_bodies
@@ -362,7 +362,7 @@ contains
         code = status_bad_count
         if (size(m, 1) == 3 .and. size(q, 1) == 4 .and. size(m, 2) == size(q, 2) &
             .and. size(body) == size(m, 2)) then
-            call flow_many(cores_of(body), size(body), .false., [h], 1, size(m, 2), m, code, q)
+            call flow_many(cores_of(body), .false., [h], m, code, q)
         end if
         call return_or_stop(code, 'free_flow', stat)
     end subroutine flow_quaternions_of_bodies

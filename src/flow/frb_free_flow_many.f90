@@ -175,9 +175,9 @@ contains
         code = status_bad_count
         if (match(core, h, n) .and. size(m, 1) == 3 .and. size(m, 2) == n) then
             if (.not. present(q)) then
-                call flow_many(core, size(core), alike, h, size(h), n, m, code)
+                call flow_many(core, alike, h, m, code)
             else if (size(q, 1) == 4 .and. size(q, 2) == n) then
-                call flow_many(core, size(core), alike, h, size(h), n, m, code, q)
+                call flow_many(core, alike, h, m, code, q)
             end if
         end if
         call return_or_stop(code, 'free_flow', stat)
@@ -193,15 +193,16 @@ contains
         real(wp), intent(inout), contiguous :: m(:, :), a(:, :, :)
         integer, intent(out), optional :: stat
         real(wp) :: q(4, chunk)
-        integer :: code, one, first, count, b, t, i
+        integer :: code, one, first, last, count, b, t, i
 
         code = status_bad_count
         if (match(core, h, n) .and. size(m, 1) == 3 .and. size(m, 2) == n .and. size(a, 1) == 3 &
             .and. size(a, 2) == 3 .and. size(a, 3) == n) then
             code = status_ok
-            !$omp parallel do if (n >= 64*chunk) private(q, count, b, t, i, one) reduction(max: code)
+            !$omp parallel do if (n >= 64*chunk) private(q, last, count, b, t, i, one) reduction(max: code)
             do first = 1, n, chunk
                 count = min(chunk, n - first + 1)
+                last = first + count - 1
                 b = merge(count, 1, size(core) > 1)
                 t = merge(count, 1, size(h) > 1)
                 do i = 1, count
@@ -209,8 +210,8 @@ contains
                     if (all(ieee_is_finite(a(:, :, first + i - 1)))) q(1, i) = 1.0_wp
                 end do
                 associate (c => merge(first, 1, b > 1), s => merge(first, 1, t > 1))
-                    call flow_many(core(c:c + b - 1), b, alike, h(s:s + t - 1), t, count, &
-                                   m(:, first:first + count - 1), one, q)
+                    call flow_many(core(c:c + b - 1), alike, h(s:s + t - 1), m(:, first:last), one, &
+                                   q(:, :count))
                 end associate
                 code = max(code, one)
                 do i = 1, count
@@ -238,11 +239,10 @@ contains
         if (match(core, h, n) .and. all([size(m1), size(m2), size(m3)] == n)) then
             if (present(q0) .and. present(q1) .and. present(q2) .and. present(q3)) then
                 if (all([size(q0), size(q1), size(q2), size(q3)] == n)) then
-                    call flow_columns(core, size(core), alike, h, size(h), n, m1, m2, m3, code, q0, q1, &
-                                      q2, q3)
+                    call flow_columns(core, alike, h, m1, m2, m3, code, q0, q1, q2, q3)
                 end if
             else if (.not. (present(q0) .or. present(q1) .or. present(q2) .or. present(q3))) then
-                call flow_columns(core, size(core), alike, h, size(h), n, m1, m2, m3, code)
+                call flow_columns(core, alike, h, m1, m2, m3, code)
             end if
         end if
         call return_or_stop(code, 'free_flow_columns', stat)
