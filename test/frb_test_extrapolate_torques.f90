@@ -80,7 +80,7 @@ contains
             call t%at_most('estimates-of-top-'//digit//'-stay-below-the-tolerance', report%largest_error, &
                            report%tolerance)
             call t%equal('torques-of-top-'//digit//'-are-counted', int(report%torques), &
-                         int(report%steps + 29*(report%steps + report%rejected)) + merge(0, 1, i == 1))
+                         int(report%steps + 48*(report%steps + report%rejected)) + merge(0, 1, i == 1))
             scalar%top = item%top
             m_other = item%m0
             q_other = item%q0
@@ -103,7 +103,7 @@ contains
         type(rigid_body) :: body
         type(extrapolation_report) :: report
         real(wp) :: m(3), q(4), m_ref(3), q_ref(4), time, angle, error(2), order
-        integer, parameter :: steps(2) = [8, 12]
+        integer, parameter :: steps(2) = [5, 7]
         integer :: i, stat
 
         ! About axis 3 alone, see frb_test_splitting.

@@ -1,21 +1,20 @@
 !> One body under torque to a given accuracy: Strang's splitting with the exact free flow, extrapolated.
 !>
-!> S(h) is kick by h/2, drift by h, kick by h/2. Over a step H the results of S(H/n)^n for n = 2..8 are
+!> S(h) is kick by h/2, drift by h, kick by h/2. Over a step H the results of S(H/n)^n for seven n are
 !> combined with the weights c_n = prod_(j /= n) n^2/(n^2 - j^2): as S is symmetric in time, its error has
 !> even powers of h only, and seven sequences give order 14 (a multi-product expansion: S. A. Chin, Celest.
 !> Mech. Dyn. Astron. 106 (2010) 391). Without the coarsest sequence they give order 12: the difference is the
-!> estimate of the error of a step. The sequences share the lanes of a vector, two in a lane: 8, 2 + 7, 3 + 6,
-!> 4 + 5, so a step takes as long as 9 drifts. (One in a lane of a vector of eight takes 8 drifts, each twice
-!> as long with AVX2.) Tolerances below 1e-13 and from 1e-5 on take other sequences: see
-!> frb_extrapolation_sets.
+!> estimate of the error of a step. The sequences n = 4..9, 13 share the lanes of a vector of four: 13, 4 + 9,
+!> 5 + 8, 6 + 7, so a step takes as long as 13 drifts. (A vector of eight takes twice as long with AVX2.)
+!> Tolerances below 1e-13 and from 1e-5 on take other sequences: see frb_extrapolation_sets.
 module frb_extrapolation
     use frb_extrapolation_control, only: first_step, without_sliver, series_reach, within_reach, &
-        first_terms_do, step_factor
+        few_terms_angle, step_factor
     use frb_extrapolation_step, only: extrapolated_body, new_extrapolated_body, ask_torque, try_step, &
         accept_step, rounding
     use frb_free_flow, only: core_of, rigid_body
     use frb_kinds, only: is_number, wp
-    use frb_rotations, only: is_unit_quat, quat_conjugate, quat_product, quat_rotate
+    use frb_rotations, only: is_unit_quat, norm3, quat_conjugate, quat_product, quat_rotate
     use frb_status, only: return_or_stop, status_ok, status_bad_attitude, status_bad_count, &
         status_bad_momentum, &
         status_bad_option, status_bad_time, status_bad_torque, status_stopped, status_too_rough
@@ -44,11 +43,11 @@ module frb_extrapolation
     !> value from 1 to 0. A tolerance below 5e-15, the rounding of a step, counts as 5e-15: `report` has the
     !> tolerance in use, the largest estimate, steps and torques. The estimate has the size of the error; for
     !> loose tolerances it is up to six times too low. Errors of steps add up and grow with the motion: on the
-    !> Hairer-Vilmart top 1e-10 gives 5e-10 at T = 10 and 2e-8 at T = 100.
+    !> Hairer-Vilmart top 1e-10 gives 2e-11 at T = 10 and 5e-10 at T = 100.
     !>
     !> Without any torque the free flow moves the body, in one step, exactly. (A pulse of torque between the
-    !> 22 to 36 times of a step is missed: then bound the step by `step`.) Where a torque is switched on or
-    !> off, the steps become short.
+    !> times of a step is missed: then bound the step by `step`.) Where a torque is switched on or off, the
+    !> steps become short.
     !>
     !> `step` > 0 switches the adaptation off: equal steps of at most this size; the tolerance only chooses
     !> the sequences. `observer` sees the start and every step. `compensated`, the default, carries the
@@ -56,7 +55,7 @@ module frb_extrapolation
     !> observer, call `extrapolate` for one interval after another, with `t`.
     !>
     !> One call of the scene's `torque_lanes` is for eight attitudes and times, of which the last four repeat
-    !> the first four. A step has 22 to 36 different attitudes, one of them by `torque`. The default
+    !> the first four. A step has 28 to 53 different attitudes, one of them by `torque`. The default
     !> `torque_lanes` calls `torque` four times.
     !>
     !> frb_splitting says when to use which method. This one is not symplectic and not reversible: the energy
@@ -73,7 +72,7 @@ module frb_extrapolation
     !> n bodies that do not interact, all in the same scene: m is (3, n), q is (4, n), the body a scalar or
     !> body(n), without an observer. Each body has its own steps; a body that is refused keeps the state it
     !> reached, and the others go on. (Bodies side by side in the lanes would not be faster: the sequences of
-    !> one body fill 35 of 36 places, and two vectors take twice as long as one.)
+    !> one body fill all places, and two vectors take twice as long as one.)
     interface extrapolate
         module procedure extrapolate_body
         module procedure extrapolate_alike
@@ -210,7 +209,7 @@ contains
         type(extrapolation_report), intent(inout) :: told
         integer, intent(out) :: code
         class(body_observer), intent(inout), optional :: observer
-        real(wp) :: start, left, left_before, h, least, guess, ratio, before, reach, few_angle
+        real(wp) :: start, left, left_before, h, least, guess, ratio, before, reach, few
         integer :: short_steps, refused
         logical :: accepted, last
 
@@ -220,8 +219,8 @@ contains
         guess = 0.0_wp
         h = 0.0_wp
         before = 0.0_wp
-        few_angle = 14*told%tolerance**(1/12.0_wp)
-        if (fixed > 0.0_wp) few_angle = 0.0_wp
+        few = few_terms_angle(moved%set, told%tolerance)
+        if (fixed > 0.0_wp) few = 0.0_wp
         short_steps = 0
         if (present(observer)) call show(moved, scene, 0_int64, t_now, observer, code)
         do while (code == status_ok .and. abs(left) > 0.0_wp)
@@ -240,7 +239,7 @@ contains
             last = h >= abs(left)
             if (last) h = abs(left)
             call try_step(moved, scene, t_now, sign(h, time), h > 1.01_wp*reach, &
-                          first_terms_do(moved, h/reach, few_angle), told%torques, refused)
+                          h*moved%core%beta*norm3(moved%x(1:3)) < few, told%torques, refused)
             if (code == status_ok) code = refused
             ! Only NaN can cause rejected steps without end.
             ratio = min(moved%error, 1.0_wp)/told%tolerance
