@@ -4,6 +4,7 @@
 !>     fpm test -- flow-laws steps      these two suites
 !>     fpm test -- --list               names of the suites, none is run
 !>     fpm test -- --published          the table of data/published.dat
+!>     fpm test -- --brief              long runs take a tenth of their steps; before or after names of suites
 !>
 !> Exit code 1 when a check failed or a name is not known. A run without its closing line has failed,
 !> whatever its exit code: something stopped in the suite whose name was written last. Two suites test the
@@ -61,10 +62,12 @@ program check
     integer, parameter :: looking = 1, listing = 2, running = 3
     type(tally) :: t
     logical, allocatable :: known(:)
+    logical :: unnamed      ! no suite is named: all run
     integer :: i
 
     allocate (known(command_argument_count()), source=.false.)
     call suites(looking)
+    unnamed = .not. any(known)
     do i = 1, size(known)
         select case (argument(i))
         case ('--list')
@@ -73,6 +76,9 @@ program check
         case ('--published')
             call print_published()
             stop
+        case ('--brief')
+            t%brief = .true.
+            known(i) = .true.
         case default
         end select
         if (.not. known(i)) then
@@ -162,7 +168,7 @@ contains
         case (listing)
             if (name(1:1) /= '-') write (output_unit, '(a)') name
         case default
-            if (any(named) .or. (size(known) == 0 .and. name(1:1) /= '-')) call test(t)
+            if (any(named) .or. (unnamed .and. name(1:1) /= '-')) call test(t)
         end select
     end subroutine suite
 

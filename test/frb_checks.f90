@@ -3,6 +3,9 @@
 !> A suite opens with the number of checks it is going to make; a different count at its end is a failure,
 !> so a test that silently does not run makes the suite fail. Checks that cannot run on this system count as
 !> skipped, and their names are printed.
+!>
+!> In a brief run, for builds that are slow by their checks, long runs take a tenth of the steps that
+!> they have in their names.
 module frb_checks
     use, intrinsic :: iso_fortran_env, only: output_unit
     use frb_kinds, only: wp
@@ -22,6 +25,7 @@ module frb_checks
         integer :: passed = 0
         integer :: failed = 0
         integer :: skipped = 0
+        logical :: brief = .false.
         integer, private :: announced = 0
         integer, private :: at_opening = 0
         character(:), allocatable, private :: suite
@@ -29,6 +33,7 @@ module frb_checks
         procedure :: open_suite
         procedure :: close_suite
         procedure :: provided
+        procedure :: long
         procedure :: ok
         procedure, private :: close_scalar
         procedure, private :: close_vector
@@ -80,6 +85,15 @@ contains
         self%skipped = self%skipped + checks
         write (output_unit, '(a,i0,a)') '  skipped ', checks, ': '//name
     end function provided
+
+    !> Steps, or bodies, of a test that is long: a tenth in a brief run.
+    pure function long(self, steps)
+        class(tally), intent(in) :: self
+        integer, intent(in) :: steps
+        integer :: long
+
+        long = merge(steps/10, steps, self%brief)
+    end function long
 
     !> The statement `name` holds when `condition` does.
     subroutine ok(self, name, condition)

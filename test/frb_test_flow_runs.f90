@@ -16,7 +16,6 @@ module frb_test_flow_runs
 
     real(wp), parameter :: eps = epsilon(1.0_wp)
     integer, parameter :: most_doublings = 10      !! 16 to 16384 steps
-    integer, parameter :: bodies = 50
 
     !> Error of N steps of 16/N, mean square over the bodies, at most this times sqrt(N), in units of the
     !> inherent sensitivity of one step of 16. Measured: 0.09 (m) and 0.10 (q).
@@ -56,8 +55,9 @@ contains
         real(wp) :: moments(3), m(3), q(4), many_m(3, 33), many_q(4, 33)
         real(wp) :: free(2, 0:most_doublings), dmv(2, 0:most_doublings), batch(2, 0:most_doublings)
         real(wp) :: steps(0:most_doublings), slope(2)
-        integer :: i, k, n, step
+        integer :: bodies, i, k, n, step
 
+        bodies = t%long(50)
         free = 0.0_wp
         dmv = 0.0_wp
         batch = 0.0_wp
@@ -124,11 +124,11 @@ contains
     subroutine check_million(t)
         type(tally), intent(inout) :: t
         real(wp), parameter :: moments(3) = [0.4_wp, 0.7_wp, 1.0_wp], m0(3) = [0.5_wp, -0.7_wp, 0.6_wp]
-        integer, parameter :: steps = 1000000
         type(rigid_body) :: body
         real(wp) :: m(3), q(4), a(3, 3), m_alone(3), m_matrix(3), many_m(3, 1), many_q(4, 1)
-        integer :: step
+        integer :: step, steps
 
+        steps = t%long(1000000)
         body = rigid_body(moments)
         m = m0
         q = no_turn
@@ -178,12 +178,13 @@ contains
     !> long steps they may drift, by a fraction of a rounding per step.
     subroutine check_bias(t)
         type(tally), intent(inout) :: t
-        integer, parameter :: motions = 48, steps = 20000
+        integer, parameter :: motions = 48
         type(stream) :: random
         type(rigid_body) :: body
         real(wp) :: moments(3), m0(3), m(3), q(4), h, mean(3), furthest(3), drift(3)
-        integer :: i, step, reach
+        integer :: i, step, steps, reach
 
+        steps = t%long(20000)
         do reach = 1, 2
             mean = 0.0_wp
             furthest = 0.0_wp

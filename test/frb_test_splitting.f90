@@ -151,14 +151,16 @@ contains
         type(recorder) :: record
         type(invariant_monitor) :: monitor
         real(wp) :: m(3), q(4), energy(1001), worst, trend
-        integer :: stat, i, k
+        integer :: stat, i, k, steps
         logical :: stop_here
 
+        steps = t%long(100000)
         item = known_top(1)
         scheme = splitting_scheme('srkn14')
         m = item%m0
         q = item%q0
-        call integrate(item%body, scheme, item%top, 0.5_wp, 100000, m, q, record, every=100, stat=stat)
+        call integrate(item%body, scheme, item%top, 0.5_wp, steps, m, q, record, every=steps/1000, &
+                       stat=stat)
         call t%equal('papers-run-comes-to-its-end', stat, status_ok)
         call t%equal('observer-is-called-at-the-start-and-every-100-steps', record%count, 1001)
         monitor%body = item%body
@@ -180,7 +182,8 @@ contains
             m = item%m0*(1 + 0.001_wp*k)
             q = item%q0
             record%count = 0
-            call integrate(item%body, scheme, item%top, 0.5_wp, 100000, m, q, record, every=100, stat=stat)
+            call integrate(item%body, scheme, item%top, 0.5_wp, steps, m, q, record, every=steps/1000, &
+                           stat=stat)
             energy = [(total_energy(item%body, item%top, record%t(i), record%m(:, i), record%q(:, i)), &
                        i=1, 1001)]
             trend = trend + fitted_change(energy)
@@ -189,7 +192,7 @@ contains
         m = item%m0
         q = item%q0
         record%count = 0
-        call integrate(item%body, scheme, item%top, 0.5_wp, 100000, m, q, record, every=100, &
+        call integrate(item%body, scheme, item%top, 0.5_wp, steps, m, q, record, every=steps/1000, &
                        compensated=.true.)
         energy = [(total_energy(item%body, item%top, record%t(i), record%m(:, i), record%q(:, i)), i=1, 1001)]
         call t%at_most('compensated-energy-of-the-papers-top-stays-within-5e-14', &
@@ -207,7 +210,7 @@ contains
         type(rigid_body) :: body
         type(spoilt_torque) :: no_potential
         real(wp) :: m(3), q(4), tensor(3, 3), h
-        integer :: i, k
+        integer :: i, k, steps
         logical :: stop_here
 
         body = rigid_body([1.0_wp, 1.0_wp, 0.5_wp])
@@ -222,6 +225,7 @@ contains
         call t%at_most('lagrange-top-keeps-its-energy', monitor%energy_error, 256*eps)
 
         ! 10 000 steps there and back; compensated runs with steps ten times as long.
+        steps = t%long(10000)
         do k = 1, 3
             item = known_top(k)
             h = merge(0.01_wp, 0.001_wp, k == 1)
@@ -229,14 +233,14 @@ contains
                 scheme = splitting_scheme(trim(scheme_names(i)))
                 m = item%m0
                 q = item%q0
-                call integrate(item%body, scheme, item%top, h, 10000, m, q)
-                call integrate(item%body, scheme, item%top, -h, 10000, m, q)
+                call integrate(item%body, scheme, item%top, h, steps, m, q)
+                call integrate(item%body, scheme, item%top, -h, steps, m, q)
                 call t%at_most(trim(scheme_names(i))//'-there-and-back-return-the-start', &
                                distance(m, q, item%m0, item%q0), reversed)
                 m = item%m0
                 q = item%q0
-                call integrate(item%body, scheme, item%top, 10*h, 10000, m, q, compensated=.true.)
-                call integrate(item%body, scheme, item%top, -10*h, 10000, m, q, compensated=.true.)
+                call integrate(item%body, scheme, item%top, 10*h, steps, m, q, compensated=.true.)
+                call integrate(item%body, scheme, item%top, -10*h, steps, m, q, compensated=.true.)
                 call t%at_most(trim(scheme_names(i))//'-compensated-there-and-back-return-the-start', &
                                distance(m, q, item%m0, item%q0), reversed)
             end do
@@ -247,8 +251,8 @@ contains
             scheme = splitting_scheme(trim(scheme_names(i)))
             m = item%m0
             q = item%q0
-            call integrate(item%body, scheme, item%top, 0.5_wp, 10000, m, q, compensated=.true.)
-            call integrate(item%body, scheme, item%top, -0.5_wp, 10000, m, q, compensated=.true.)
+            call integrate(item%body, scheme, item%top, 0.5_wp, steps, m, q, compensated=.true.)
+            call integrate(item%body, scheme, item%top, -0.5_wp, steps, m, q, compensated=.true.)
             call t%at_most(trim(scheme_names(i))//'-papers-long-run-there-and-back-returns-the-start', &
                            distance(m, q, item%m0, item%q0), 2.0e-13_wp)
         end do
@@ -301,7 +305,8 @@ contains
         allocate (monitor%scene, source=item%top)
         m = item%m0
         q = item%q0
-        call integrate(item%body, scheme, item%top, 0.01_wp, 20000, m, q, monitor, compensated=.true.)
+        call integrate(item%body, scheme, item%top, 0.01_wp, t%long(20000), m, q, monitor, &
+                       compensated=.true.)
         call t%at_most('compensated-energy-does-not-wander', monitor%energy_error, compensated_energy*eps)
         call t%at_most('compensated-momentum-does-not-wander', monitor%momentum_error, 32*eps)
         call t%at_most('compensated-norm-does-not-wander', monitor%norm_error, 4*eps)

@@ -117,7 +117,10 @@ python_package_agrees() {
 tests_by_flang() {
     command -v flang-new-22 >/dev/null || [ "${FRB_CI_FULL:-}" = 1 ] || skipped "no flang-22"
     apt_package flang-new-22 flang-22
-    "$fpm" test --compiler flang-new-22 --flag "-O1" 2>&1 | tee log
+    library_and_tests_alone
+    local flags="-O0" brief=--brief
+    if [ "${FRB_CI_FULL:-}" = 1 ]; then flags=-O2 brief=; fi
+    "$fpm" test --compiler flang-new-22 --flag "$flags" -- $brief 2>&1 | tee log
     if grep -i 'warning:' log; then return 1; fi
     grep -E '^[0-9]+ skipped$' log
 }

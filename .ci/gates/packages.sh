@@ -14,9 +14,3 @@ default_kinds_do_not_matter() {
     cd test/packages/kinds
     "$fpm" run --flag "-fdefault-real-8 -fdefault-integer-8"
 }
-
-# The library built by the flags for speed, as run sets them, goes into a shared object.
-shared_object_calls_the_library() {
-    ./run --native fpm install --prefix "$PWD/build/installed"
-    test/packages/shared/link.sh "$PWD/build/installed"
-}

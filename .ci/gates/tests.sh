@@ -4,11 +4,32 @@ strict="-O0 -g -std=f2008 -pedantic -Wall -Wextra -Werror -fcheck=all,no-array-t
 optimised="-O3 -Wall -Wextra -Werror"
 # Code for the machine at hand: fused operations, long vectors.
 native="-O3 -march=native -fno-math-errno -fno-trapping-math"
-recommended="$native -fno-tree-slp-vectorize -mprefer-vector-width=512"
 sanitized="-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer"
+
+# Without the drivers, charts and examples, which fpm builds with the tests. Files that the tests include stay.
+library_and_tests_alone() {
+    find app examples -name '*.f90' -delete
+    sed -i '/^\[\[example\]\]/,/^$/d' fpm.toml
+}
+
+# All that is compiled; long tests in brief, but before a version is named.
+tests_strict() {
+    local brief=--brief
+    [ "${FRB_CI_FULL:-}" != 1 ] || brief=
+    "$fpm" test --no-prune --flag "$strict $sanitized" -- $brief
+}
+
+# The library built by the flags for speed goes into a shared object, too.
+tests_native() {
+    library_and_tests_alone
+    ./run --native test
+    ./run --native fpm install --prefix "$PWD/build/installed"
+    test/packages/shared/link.sh "$PWD/build/installed"
+}
 
 # tests_built FLAGS: where the compiler takes these flags.
 tests_built() {
+    library_and_tests_alone
     echo end | gfortran $1 -x f95 -c -o /dev/null - || skipped "the compiler refuses $1"
     "$fpm" test --flag "$1"
 }
@@ -16,11 +37,13 @@ tests_built() {
 # tests_by COMPILER FLAGS: by another release of the compiler.
 tests_by() {
     apt_package "$1" "$1"
+    library_and_tests_alone
     "$fpm" test --compiler "$1" --flag "$2"
 }
 
 # The README's command. A check that fails, a stop in the library and an unknown name fail it.
 tests_can_fail() {
+    library_and_tests_alone
     ./run test
     if ./run test -- --fail >log 2>&1; then return 1; fi
     grep -Eq '^[0-9]+ passed, 1 failed$' log
@@ -34,6 +57,7 @@ tests_can_fail() {
 
 # Lines of src/ that the tests run, in percent of all.
 tests_run_every_line() {
+    library_and_tests_alone
     "$fpm" test --flag "-O0 --coverage"
     python3 .ci/gates/coverage.py 97
 }
