@@ -8,7 +8,7 @@ prepare_clients() {
     lines=$PWD/lines
     (
         flock 9
-        [ -e "$here/done" ] || ./run install "$here"
+        [ -e "$here/done" ] || { rm app/charts/frb_charts.f90 && ./run install "$here"; }
         touch "$here/done"
     ) 9>"$work/linking.lock"
     export PKG_CONFIG_PATH=$here/lib/pkgconfig

@@ -19,16 +19,23 @@ readme_commands_run() {
     done < <(readme_commands)
 }
 
-# Each program of the README, a block marked fortran, prints the text block after it.
+# Each program of the README, a block marked fortran, prints the text block after it. All are in one package.
 readme_programs_say_what_is_printed_below_them() {
-    local number
-    for number in $(seq "$(grep -cx '```fortran' README.md)"); do
-        mkdir -p "build/readme$number/app"
-        printf 'name = "readme"\n[dependencies]\nfrb.path = "../.."\n' >"build/readme$number/fpm.toml"
-        readme_block fortran "$number" >"build/readme$number/app/main.f90"
-        readme_block text "$number" >"build/readme$number/expected"
-        [ -s "build/readme$number/expected" ]
-        (cd "build/readme$number" && "$fpm" build && "$fpm" run >output && diff expected output)
+    local number count
+    count=$(grep -cx '```fortran' README.md)
+    mkdir -p build/readme/app
+    printf 'name = "readme"\n[dependencies]\nfrb.path = "../.."\n' >build/readme/fpm.toml
+    for number in $(seq "$count"); do
+        printf '[[executable]]\nname = "program%d"\nmain = "program%d.f90"\n' $number $number >>build/readme/fpm.toml
+        readme_block fortran "$number" >"build/readme/app/program$number.f90"
+    done
+    cd build/readme
+    "$fpm" build
+    for number in $(seq "$count"); do
+        (cd ../..; readme_block text "$number") >expected
+        [ -s expected ]
+        "$fpm" run "program$number" >output
+        diff expected output
     done
 }
 
