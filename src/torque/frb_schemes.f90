@@ -318,7 +318,7 @@ contains
         class(splitting_scheme), intent(in) :: self
         logical :: modified
 
-        modified = any(abs(self%half_c) > 0.0_wp)
+        modified = any(abs(self%half_c(:(self%kicks + 1)/2)) > 0.0_wp)
     end function has_modified_kicks
 
     !> Kicks per step in a chain of steps, where a kick that closes a step and the one that opens
@@ -352,7 +352,9 @@ contains
         integer :: i
 
         if (size(half) >= (count + 1)/2) then
-            full = [(half(min(i, count + 1 - i)), i=1, count)]
+            do i = 1, count
+                full(i) = half(min(i, count + 1 - i))
+            end do
         else
             full = ieee_value(full, ieee_quiet_nan)
         end if

@@ -95,19 +95,8 @@ contains
     subroutine integrate_alike(body, scheme, scene, h, nsteps, m, q, observer, every, t, drift, &
                       compensated, rests, joined, stat)
         type(rigid_body), intent(in) :: body
-        type(splitting_scheme), intent(in) :: scheme
-        class(group_scene), intent(inout) :: scene
-        real(wp), intent(in) :: h
         integer(int64), intent(in) :: nsteps
-        real(wp), contiguous, intent(inout) :: m(:, :), q(:, :)
-        class(group_observer), intent(inout), optional :: observer
-        integer, intent(in), optional :: every
-        real(wp), intent(inout), optional :: t
-        class(body_drift), intent(in), optional :: drift
-        logical, intent(in), optional :: compensated
-        real(wp), intent(inout), optional :: rests(:, :)
-        logical, intent(in), optional :: joined
-        integer, intent(out), optional :: stat
+        include 'group_arguments.inc'
 
         call integrate_group([body], scheme, scene, h, nsteps, m, q, observer, every, t, drift, &
                       compensated, rests, joined, stat)
@@ -139,19 +128,8 @@ contains
     subroutine integrate_alike_int32(body, scheme, scene, h, nsteps, m, q, observer, every, t, drift, &
                       compensated, rests, joined, stat)
         type(rigid_body), intent(in) :: body
-        type(splitting_scheme), intent(in) :: scheme
-        class(group_scene), intent(inout) :: scene
-        real(wp), intent(in) :: h
         integer(int32), intent(in) :: nsteps
-        real(wp), contiguous, intent(inout) :: m(:, :), q(:, :)
-        class(group_observer), intent(inout), optional :: observer
-        integer, intent(in), optional :: every
-        real(wp), intent(inout), optional :: t
-        class(body_drift), intent(in), optional :: drift
-        logical, intent(in), optional :: compensated
-        real(wp), intent(inout), optional :: rests(:, :)
-        logical, intent(in), optional :: joined
-        integer, intent(out), optional :: stat
+        include 'group_arguments.inc'
 
         call integrate_group([body], scheme, scene, h, int(nsteps, int64), m, q, observer, every, t, drift, &
                       compensated, rests, joined, stat)
@@ -161,19 +139,8 @@ contains
     subroutine integrate_group_int32(body, scheme, scene, h, nsteps, m, q, observer, every, t, drift, &
                       compensated, rests, joined, stat)
         type(rigid_body), intent(in) :: body(:)
-        type(splitting_scheme), intent(in) :: scheme
-        class(group_scene), intent(inout) :: scene
-        real(wp), intent(in) :: h
         integer(int32), intent(in) :: nsteps
-        real(wp), contiguous, intent(inout) :: m(:, :), q(:, :)
-        class(group_observer), intent(inout), optional :: observer
-        integer, intent(in), optional :: every
-        real(wp), intent(inout), optional :: t
-        class(body_drift), intent(in), optional :: drift
-        logical, intent(in), optional :: compensated
-        real(wp), intent(inout), optional :: rests(:, :)
-        logical, intent(in), optional :: joined
-        integer, intent(out), optional :: stat
+        include 'group_arguments.inc'
 
         call integrate_group(body, scheme, scene, h, int(nsteps, int64), m, q, observer, every, t, drift, &
                       compensated, rests, joined, stat)

@@ -8,7 +8,7 @@ module frb_splitting_one
     use frb_modified_kicks, only: angular_response, gradient_torque, turned
     use frb_rotations, only: cross, is_unit_quat
     use frb_schemes, only: splitting_scheme
-    use frb_splitting_plan, only: splitting_plan, run_basis, new_basis, check_run, next_time
+    use frb_splitting_plan, only: splitting_plan, run_basis, new_basis, check_run
     use frb_status, only: return_or_stop, status_ok, status_bad_attitude, status_bad_momentum, &
         status_bad_torque, status_not_offered, status_stopped
     use frb_torque, only: body_scene, body_observer, body_drift
@@ -95,6 +95,8 @@ contains
         if (code == status_stopped .and. .not. present(stat)) return
         call return_or_stop(code, 'integrate', stat)
     end subroutine integrate_body
+
+    include 'next_time.inc'
 
     include 'splitting_steps.inc'
 

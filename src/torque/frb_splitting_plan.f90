@@ -70,8 +70,8 @@ contains
         type(splitting_scheme), intent(in) :: scheme
         real(wp), intent(in) :: h
         type(splitting_plan) :: plan
-        real(wp) :: a(scheme%drifts), b(scheme%kicks)
-        integer :: i, s
+        real(wp) :: a(scheme%drifts), b(scheme%kicks), passed
+        integer :: i, s, first
 
         plan%status = scheme%status
         if (plan%status == status_ok .and. .not. is_step(scheme, h)) plan%status = status_bad_time
@@ -85,14 +85,14 @@ contains
         b = scheme%kick_coefficients()
         plan%kick(:) = b*h
         if (scheme%has_modified_kicks()) plan%modified(:) = scheme%modified_coefficients()*h*h*h
-        if (scheme%drift_first) then
-            plan%drift(:) = a*h
-            plan%time(:) = [(sum(a(1:i))*h, i=1, s)]
-        else
-            plan%drift(2:s) = a*h
-            plan%time(2:s) = [(sum(a(1:i))*h, i=1, s - 1)]
-            plan%time(s) = h
-        end if
+        first = merge(1, 2, scheme%drift_first)
+        plan%drift(first:first + scheme%drifts - 1) = a*h
+        passed = 0.0_wp
+        do i = first, s
+            passed = passed + a(i + 1 - first)
+            plan%time(i) = passed*h
+        end do
+        if (.not. scheme%drift_first) plan%time(s) = h
     end function plan_of_step
 
     !> The same, with its status in `stat` too.
@@ -118,24 +118,7 @@ contains
         if (good .and. scheme%has_modified_kicks()) good = abs(h) <= longest_cubed
     end function is_step
 
-    !> The time one step after t: t + (n + 1) h - n h rounded, n the steps from zero to t. It depends on t and
-    !> h alone, so a continued run has the times of a run in one call. The rounding errors of n h cancel, so
-    !> the time stays within a few units of the last digit of start + steps*h.
-    pure function next_time(t, h) result(next)
-        real(wp), intent(in) :: t, h
-        real(wp) :: next
-        real(wp), parameter :: resolved = 2.0_wp**(-52)
-        ! A fraction that t/h seldom has: n then grows by one in each step.
-        real(wp), parameter :: between = 0.38_wp
-        real(wp) :: n
-
-        if (abs(t)*resolved < abs(h)) then
-            n = floor(t/h + between, int64)
-            next = t + ((n + 1)*h - n*h)
-        else
-            next = t + h
-        end if
-    end function next_time
+    include 'next_time.inc'
 
     !> The basis of a run of steps of size h.
     pure function new_basis(scheme, plan, h, compensated, joined) result(basis)
