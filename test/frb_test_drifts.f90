@@ -24,11 +24,12 @@ contains
     subroutine test_drifts(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('drifts', 88)
+        call t%open_suite('drifts', 91)
         call test_runs(t)
         call test_tensors(t)
         call test_almost_aligned(t)
         call test_linear_rotors(t)
+        call test_long_turns(t)
         call test_names(t)
         call t%close_suite()
     end subroutine test_drifts
@@ -243,6 +244,27 @@ contains
             end do
         end do
     end subroutine test_linear_rotors
+
+    !> A compensated run keeps |q| through long turns, equal ones too: a sphere, and bodies that tumble.
+    subroutine test_long_turns(t)
+        type(tally), intent(inout) :: t
+        real(wp), parameter :: moments(3, 3) = reshape([1.0_wp, 1.0_wp, 1.0_wp, 2.0_wp, 0.7_wp, 2.0_wp, &
+                                                        0.3_wp, 1.0_wp, 0.31_wp], [3, 3])
+        type(heavy_top) :: weightless
+        real(wp) :: m(3), q(4)
+        character :: digit
+        integer :: k
+
+        weightless%force = 0.0_wp
+        do k = 1, 3
+            m = [0.3_wp, 0.8_wp, -0.5_wp]
+            q = [0.5_wp, -0.5_wp, 0.5_wp, 0.5_wp]
+            call integrate(rigid_body(moments(:, k)), splitting_scheme('strang'), weightless, 5.0_wp, &
+                           t%long(20000), m, q, compensated=.true.)
+            write (digit, '(i0)') k
+            call t%at_most('compensated-long-turns-keep-the-norm-of-body-'//digit, abs(norm_defect(q)), 2*eps)
+        end do
+    end subroutine test_long_turns
 
     !> Names of drifts that are known, and names that are refused.
     subroutine test_names(t)
