@@ -124,8 +124,8 @@ contains
         change(4) = q(1)*r(4) + q(4)*w + q(2)*r(3) - q(3)*r(2)
     end function increment
 
-    !> q + change, and |q| as before: rounding errors of the change are removed along q. Long equal turns would
-    !> change |q| by up to half an epsilon a step, always in one direction.
+    !> q + change, and |q| as before: rounding errors of the change are removed along q. Long equal turns
+    !> would change |q| by up to half an epsilon a step, always in one direction.
     pure subroutine keep_norm_of_attitude(change, q, q_rest)
         real(wp), intent(in) :: change(4)
         real(wp), intent(inout) :: q(4), q_rest(4)
