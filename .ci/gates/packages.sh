@@ -1,9 +1,8 @@
 # Packages of their own that use this one: test/packages/. Each says in its fpm.toml how it is run by hand.
 
-# package_runs NAME: in debug and in release.
-package_runs() {
-    cd "test/packages/$1"
-    "$fpm" run
+# In release; the programs of the README are a package in debug.
+dependent_package_runs() {
+    cd test/packages/dependent
     "$fpm" run --profile release
 }
 

@@ -56,13 +56,13 @@ contains
 
         allocate (steps, source=[(10.0_wp**(merge(k/1.0_wp, k/3.0_wp, options%quick) - 3), &
                                   k=0, merge(4, 12, options%quick))])
-        allocate (works(size(methods)), ns(size(methods), size(steps), merge(5, 9, options%quick)))
+        allocate (works(size(methods)), ns(size(methods), size(steps), merge(3, 9, options%quick)))
         do i = 1, size(methods)
             works(i) = new_workload(methods(i), moments, start, 1.0_wp, &
                                     merge(1000, 1, methods(i)%family == family_batch))
         end do
         call time_over_steps(options, what, works, steps, merge(1.0e-3_wp, 2.0e-3_wp, options%quick), &
-                             merge(5, 20, options%quick), ns)
+                             merge(3, 20, options%quick), ns)
         allocate (table(7, size(methods), size(steps)))
         do k = 1, size(steps)
             call summarise(methods, ns(:, k, :), table(:, :, k))
@@ -138,7 +138,7 @@ contains
         integer :: i, k
 
         allocate (steps, source=all_steps(::merge(2, 1, options%quick)))
-        allocate (works(size(names)), ns(size(names), size(steps), merge(5, 9, options%quick)))
+        allocate (works(size(names)), ns(size(names), size(steps), merge(3, 9, options%quick)))
         allocate (ratios(size(ns, 3), 9))
         do i = 1, size(names)
             works(i) = new_workload(find_method(trim(names(i))), moments, start, 1.0_wp, bodies(i))
@@ -194,7 +194,7 @@ contains
         integer :: k
 
         allocate (steps, source=all_steps(::merge(2, 1, options%quick)))
-        allocate (ns(2, size(steps), merge(5, 9, options%quick)))
+        allocate (ns(2, size(steps), merge(3, 9, options%quick)))
         works(1) = new_workload(find_method('flow'), moments, start, 1.0_wp, 1)
         works(2) = new_workload(find_method('flow-m'), moments, start, 1.0_wp, 1)
         call open_table(options, 'long-steps', &

@@ -67,7 +67,7 @@ contains
             end do
         end do
         times = huge(times)
-        do r = 1, merge(5, 25, options%quick)
+        do r = 1, merge(2, 25, options%quick)
             do k = 1, count_of_settings
                 do i = 1, size(solvers)
                     call run_solver(solvers(i), top, duration, setting(k, i), rounds(k, i), m, q, seconds, &

@@ -293,9 +293,10 @@ contains
         type(placed_top) :: item
         type(splitting_scheme) :: scheme
         real(wp) :: m(3), q(4), m_end(3), q_end(4), back(2), growth
-        integer :: number, j, k, i
+        integer :: tops, number, j, k, i
 
-        do number = 1, 3
+        tops = merge(1, 3, options%quick)
+        do number = 1, tops
             item = top_number(number)
             do j = 1, size(sizes)
                 do k = 1, size(scheme_names)
@@ -320,7 +321,7 @@ contains
                     call file%put()
                 end do
             end do
-            call progress(options, 'torque-reversal', number, 3)
+            call progress(options, 'torque-reversal', number, tops)
         end do
     end subroutine reversal
 
