@@ -30,7 +30,8 @@ tests_native() {
 # tests_built FLAGS: where the compiler takes these flags.
 tests_built() {
     library_and_tests_alone
-    echo end | gfortran $1 -x f95 -c -o /dev/null - || skipped "the compiler refuses $1"
+    echo end >probe.f90
+    gfortran $1 -c -o /dev/null probe.f90 || skipped "the compiler refuses $1"
     "$fpm" test --flag "$1"
 }
 
