@@ -33,7 +33,7 @@ module frb_checks
         procedure :: open_suite
         procedure :: close_suite
         procedure :: provided
-        procedure :: long
+        procedure :: many
         procedure :: ok
         procedure, private :: close_scalar
         procedure, private :: close_vector
@@ -87,13 +87,13 @@ contains
     end function provided
 
     !> Steps, or bodies, of a test that is long: a tenth in a brief run.
-    pure function long(self, steps)
+    pure function many(self, steps)
         class(tally), intent(in) :: self
         integer, intent(in) :: steps
-        integer :: long
+        integer :: many
 
-        long = merge(steps/10, steps, self%brief)
-    end function long
+        many = merge(steps/10, steps, self%brief)
+    end function many
 
     !> The statement `name` holds when `condition` does.
     subroutine ok(self, name, condition)

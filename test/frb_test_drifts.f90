@@ -112,7 +112,7 @@ contains
         integer :: i, k, place, steps, stat
 
         nothing%force = 0.0_wp
-        steps = t%long(30000)
+        steps = t%many(30000)
         scheme = splitting_scheme('strang')
         do k = 1, size(names)
             call drift_by_name(trim(names(k)), drift)
@@ -197,7 +197,7 @@ contains
             weightless%force = 0.0_wp
             m = m0
             q = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-            call integrate(body, splitting_scheme('strang'), weightless, 0.5_wp, t%long(8000), m, q, &
+            call integrate(body, splitting_scheme('strang'), weightless, 0.5_wp, t%many(8000), m, q, &
                            drift=drift, compensated=compensated)
             lost = [kinetic_energy(body, m)/kinetic_energy(body, m0) - 1, norm2(m)/norm2(m0) - 1, &
                     norm_defect(q), norm2(spatial_momentum(m, q) - m0)/norm2(m0)]

@@ -57,7 +57,7 @@ contains
         real(wp) :: steps(0:most_doublings), slope(2)
         integer :: bodies, i, k, n, step
 
-        bodies = t%long(50)
+        bodies = t%many(50)
         free = 0.0_wp
         dmv = 0.0_wp
         batch = 0.0_wp
@@ -128,7 +128,7 @@ contains
         real(wp) :: m(3), q(4), a(3, 3), m_alone(3), m_matrix(3), many_m(3, 1), many_q(4, 1)
         integer :: step, steps
 
-        steps = t%long(1000000)
+        steps = t%many(1000000)
         body = rigid_body(moments)
         m = m0
         q = no_turn
@@ -184,7 +184,7 @@ contains
         real(wp) :: moments(3), m0(3), m(3), q(4), h, mean(3), furthest(3), drift(3)
         integer :: i, step, steps, reach
 
-        steps = t%long(20000)
+        steps = t%many(20000)
         do reach = 1, 2
             mean = 0.0_wp
             furthest = 0.0_wp

@@ -304,7 +304,7 @@ contains
         do j = 1, 2
             trend = 0.0_wp
             worst = 0.0_wp
-            steps = t%long(nint(5.0e4_wp/sizes(j)))
+            steps = t%many(nint(5.0e4_wp/sizes(j)))
             do k = 0, 3
                 m = item%m0*(1 + 0.001_wp*k)
                 q = item%q0

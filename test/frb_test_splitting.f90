@@ -155,7 +155,7 @@ contains
         integer :: stat, i, k, steps
         logical :: stop_here
 
-        steps = t%long(100000)
+        steps = t%many(100000)
         item = known_top(1)
         scheme = splitting_scheme('srkn14')
         m = item%m0
@@ -266,7 +266,7 @@ contains
         integer :: i, k, steps
 
         ! 10 000 steps there and back; compensated runs with steps ten times as long.
-        steps = t%long(10000)
+        steps = t%many(10000)
         do k = 1, 3
             item = known_top(k)
             h = merge(0.01_wp, 0.001_wp, k == 1)
@@ -316,7 +316,7 @@ contains
         allocate (monitor%scene, source=item%top)
         m = item%m0
         q = item%q0
-        call integrate(item%body, scheme, item%top, 0.01_wp, t%long(20000), m, q, monitor, &
+        call integrate(item%body, scheme, item%top, 0.01_wp, t%many(20000), m, q, monitor, &
                        compensated=.true.)
         call t%at_most('compensated-energy-does-not-wander', monitor%energy_error, compensated_energy*eps)
         call t%at_most('compensated-momentum-does-not-wander', monitor%momentum_error, 32*eps)
