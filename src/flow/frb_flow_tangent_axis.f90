@@ -25,11 +25,7 @@ contains
     pure subroutine follow_axis(body, tau, m, elements, q, transition, jacobian, by_inertia)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: tau, m(3)
-        integer, intent(in) :: elements
-        real(wp), intent(inout), optional :: q(4)
-        real(wp), intent(inout), optional :: transition(6, 6)
-        real(wp), intent(inout), optional :: jacobian(3, 3)
-        real(wp), intent(inout), optional :: by_inertia(6, elements)
+        include 'tangent_results.inc'
         type(axis_map) :: map
         real(wp) :: column(6), half(4), p(4)
         integer :: k

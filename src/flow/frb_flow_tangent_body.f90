@@ -59,11 +59,7 @@ contains
         real(wp), intent(in) :: h
         real(wp), intent(inout) :: m(3)
         integer, intent(out) :: code
-        integer, intent(in) :: elements     !! of the inertia, by which to differentiate: 0, 3 or 6
-        real(wp), intent(inout), optional :: q(4)
-        real(wp), intent(inout), optional :: transition(6, 6)
-        real(wp), intent(inout), optional :: jacobian(3, 3)
-        real(wp), intent(inout), optional :: by_inertia(6, elements)
+        include 'tangent_results.inc'
         real(wp) :: rate, size_m, size_q
         logical :: plain
 
@@ -157,11 +153,7 @@ contains
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: h
         real(wp), intent(inout) :: m(3)
-        integer, intent(in) :: elements
-        real(wp), intent(inout), optional :: q(4)
-        real(wp), intent(inout), optional :: transition(6, 6)
-        real(wp), intent(inout), optional :: jacobian(3, 3)
-        real(wp), intent(inout), optional :: by_inertia(6, elements)
+        include 'tangent_results.inc'
         type(step_parts) :: parts
         logical :: done
 
@@ -187,11 +179,7 @@ contains
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: h
         real(wp), intent(inout) :: m(3)
-        integer, intent(in) :: elements
-        real(wp), intent(inout), optional :: q(4)
-        real(wp), intent(inout), optional :: transition(6, 6)
-        real(wp), intent(inout), optional :: jacobian(3, 3)
-        real(wp), intent(inout), optional :: by_inertia(6, elements)
+        include 'tangent_results.inc'
         type(step_parts) :: parts
         real(wp) :: reached, part
 
@@ -232,11 +220,7 @@ contains
         real(wp), intent(in) :: h
         real(wp), intent(inout) :: m(3)
         integer, intent(out) :: code
-        integer, intent(in) :: elements     !! of the inertia, by which to differentiate: 0, 3 or 6
-        real(wp), intent(inout), optional :: q(4)
-        real(wp), intent(inout), optional :: transition(6, 6)
-        real(wp), intent(inout), optional :: jacobian(3, 3)
-        real(wp), intent(inout), optional :: by_inertia(6, elements)
+        include 'tangent_results.inc'
         type(body_core) :: principal
         real(wp) :: n(3), old(3), change(4), c(3)
 
@@ -308,11 +292,7 @@ contains
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: h
         real(wp), intent(inout) :: m(3)
-        integer, intent(in) :: elements
-        real(wp), intent(inout), optional :: q(4)
-        real(wp), intent(inout), optional :: transition(6, 6)
-        real(wp), intent(inout), optional :: jacobian(3, 3)
-        real(wp), intent(inout), optional :: by_inertia(6, elements)
+        include 'tangent_results.inc'
         integer, parameter :: cut = 64     ! angles of 2^64 and more have no phase
         type(body_core) :: scaled
         real(wp) :: time

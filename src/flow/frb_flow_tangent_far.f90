@@ -4,12 +4,13 @@
 !> third of the time that it takes alone (AVX2: 75 to 90 ns instead of 230 to 300).
 module frb_flow_tangent_far
     use frb_flow_limits, only: middle_limit, square_limit, sin_cos_limit
-    use frb_flow_tangent_lanes, only: lanes, lane_orbits, lane_ends
+    use frb_flow_tangent_ends, only: lane_forms, lane_ends, set_forms, finish_lanes
+    use frb_flow_tangent_lanes, only: lanes, lane_body, lane_orbits
     use frb_kinds, only: wp
     implicit none
     private
 
-    public :: find_far_ends
+    public :: step_far
 
     !> Most doublings: 4^6 square_limit > period_limit, 4^3 middle_limit > square_limit.
     integer, parameter :: most_triples = 6, most_squares = 3
@@ -19,6 +20,7 @@ module frb_flow_tangent_far
         real(wp) :: norm(lanes), delta(lanes), pmax(lanes), pmin(lanes)     !! |m|, |R - P|, larger, smaller
         real(wp) :: cn(lanes)                                       !! 1 or -1: c or d is cn-like
         real(wp) :: squares(lanes), triples(lanes), span(lanes)     !! doublings; square of the first time
+        real(wp) :: z(lanes)                                        !! denominator of the triple
         real(wp) :: c(lanes)                                        !! the function of the triple for p
         real(wp) :: n2(lanes), n3(lanes)                            !! momentum at mid-step
         real(wp) :: cosine(lanes), sine(lanes), along(lanes)        !! of the turn e about m
@@ -32,37 +34,39 @@ module frb_flow_tangent_far
 
 contains
 
-    !> Computes the parts that finish_lanes combines, for the lanes of `of`; b: beta t of the body.
-    pure subroutine find_far_ends(b, of, ends)
-        real(wp), intent(in) :: b
-        type(lane_orbits), intent(in) :: of
-        type(lane_ends), intent(inout) :: ends
+    !> Advances the lanes of a block.
+    pure subroutine step_far(body, orbits, m, q, transition)
+        type(lane_body), intent(in) :: body
+        type(lane_orbits), intent(in) :: orbits
+        real(wp), intent(inout) :: m(3*lanes), q(4*lanes), transition(36*lanes)
+        type(lane_forms) :: of
+        type(lane_ends) :: ends
         type(doubling_lanes) :: it
         type(lane_triples) :: at(2)     ! a doubling reads one and writes the other
         integer :: i, now               ! number of the present one
 
-        call count_halvings(b, of, it)
-        call find_first_parts(b, of, it, at(1))
-        call find_uniform_turns(of, it)
+        call set_forms(body, orbits, of)
+        call count_halvings(body%b, of, it)
+        call find_first_parts(body%b, of, it, at(1))
         now = 1
         do i = nint(maxval(it%squares)), 1, -1
-            call double_squares(i, b, of, it, at(now), at(3 - now))
+            call double_squares(i, body%b, of, it, at(now), at(3 - now))
             now = 3 - now
         end do
         do i = nint(maxval(it%triples)), 1, -1
-            call double_triples(i, b, of, it, at(now), at(3 - now))
+            call double_triples(i, body%b, of, it, at(now), at(3 - now))
             now = 3 - now
         end do
-        call find_momenta(b, of, it, at(now), ends)
-        call find_turns(b, of, it, at(now), ends)
-        call find_columns(b, of, it, at(now), ends)
-        call find_covectors(b, of, it, at(now), ends)
-    end subroutine find_far_ends
+        call find_momenta(body%b, of, it, at(now), ends)
+        call find_turns(body%b, of, it, at(now), ends)
+        call find_columns(body%b, of, it, at(now), ends)
+        call finish_lanes(body, of, ends, m, q, transition)
+    end subroutine step_far
 
     !> The number of doublings of each lane, and the square of the part of the time before them.
     pure subroutine count_halvings(b, of, it)
         real(wp), intent(in) :: b
-        type(lane_orbits), intent(in) :: of
+        type(lane_forms), intent(in) :: of
         type(doubling_lanes), intent(inout) :: it
         real(wp) :: span, triples, squares, pmax, delta
         integer :: l, n
@@ -91,10 +95,11 @@ contains
         end do
     end subroutine count_halvings
 
-    !> The triple and the integrals at the time that the series reach.
+    !> The triple and the integrals at the time that the series reach; cosine and sine of the part of half the
+    !> angle about m that grows with the time.
     pure subroutine find_first_parts(b, of, it, at)
         real(wp), intent(in) :: b
-        type(lane_orbits), intent(in) :: of
+        type(lane_forms), intent(in) :: of
         type(doubling_lanes), intent(inout) :: it
         type(lane_triples), intent(inout) :: at
         real(wp) :: span, y, s, s3, dd, own, other, theta
@@ -120,34 +125,22 @@ contains
             it%norm(l) = s
             theta = (b*s)*of%nu(l)*(y*at%s(l)*middle_third_kind(it%pmax(l)*y, it%pmin(l)*y, of%nu(l)*y))
             call base_angle(theta, at%ec(l), at%es(l))
+            call sin_cos(max(-sin_cos_limit, min(sin_cos_limit, s*of%rate(l))), it%sine(l), it%cosine(l))
         end do
     end subroutine find_first_parts
-
-    !> Cosine and sine of the part of half the angle about m that grows with the time.
-    pure subroutine find_uniform_turns(of, it)
-        type(lane_orbits), intent(in) :: of
-        type(doubling_lanes), intent(inout) :: it
-        integer :: l
-
-        do l = 1, lanes
-            call sin_cos(max(-sin_cos_limit, min(sin_cos_limit, it%norm(l)*of%rate(l))), it%sine(l), &
-                         it%cosine(l))
-        end do
-    end subroutine find_uniform_turns
 
     !> The doubling that is followed by i - 1 others of this kind: see double_square.
     pure subroutine double_squares(i, b, of, it, from, to)
         integer, intent(in) :: i
         real(wp), intent(in) :: b
-        type(lane_orbits), intent(in) :: of
-        type(doubling_lanes), intent(in) :: it
+        type(lane_forms), intent(in) :: of
+        type(doubling_lanes), intent(inout) :: it
         type(lane_triples), intent(in) :: from
         type(lane_triples), intent(inout) :: to
-        real(wp) :: y, s, c, d, z, over, dd, own, ec, es, left
+        real(wp) :: y, s, c, d, z, ec, es
         integer :: l
 
         do l = 1, lanes
-            left = it%squares(l)
             y = from%y(l)
             z = 1.0_wp
             call double_square(it%pmax(l), it%pmin(l), y, c, d, z)
@@ -155,72 +148,82 @@ contains
             ec = from%ec(l)
             es = from%es(l)
             call double_angle(of%nu(l), b*it%norm(l), from%y(l), 1.0_wp, s, c*d, z, ec, es)
-            over = 1/z
-            y = y*(over*over)
-            s = s*over
-            c = c*over
-            d = d*over
-            dd = from%dd(l)
-            own = from%own(l)
-            call double_integrals(from%s(l), from%d(l), s, d, dd, own)
-            to%y(l) = merge(y, from%y(l), left >= i)
-            to%s(l) = merge(s, from%s(l), left >= i)
-            to%c(l) = merge(c, from%c(l), left >= i)
-            to%d(l) = merge(d, from%d(l), left >= i)
-            to%dd(l) = merge(dd, from%dd(l), left >= i)
-            to%own(l) = merge(own, from%own(l), left >= i)
-            to%ec(l) = merge(ec, from%ec(l), left >= i)
-            to%es(l) = merge(es, from%es(l), left >= i)
+            to%s(l) = s
+            to%c(l) = c
+            to%d(l) = d
+            to%ec(l) = ec
+            to%es(l) = es
+            it%z(l) = z
         end do
+        call keep_doubled(i, it%squares, it%z, from, to)
     end subroutine double_squares
 
     !> A doubling of the triple, followed by i - 1 others: see double_triple.
     pure subroutine double_triples(i, b, of, it, from, to)
         integer, intent(in) :: i
         real(wp), intent(in) :: b
-        type(lane_orbits), intent(in) :: of
-        type(doubling_lanes), intent(in) :: it
+        type(lane_forms), intent(in) :: of
+        type(doubling_lanes), intent(inout) :: it
         type(lane_triples), intent(in) :: from
         type(lane_triples), intent(inout) :: to
-        real(wp) :: s, c, d, z, over, dd, own, ec, es, left, old_s, old_d
+        real(wp) :: s, c, d, z, ec, es
         integer :: l
 
         do l = 1, lanes
-            left = it%triples(l)
             s = from%s(l)
             c = from%c(l)
             d = from%d(l)
-            old_s = s
-            old_d = d
             z = 1.0_wp
             call double_triple(it%pmax(l), it%delta(l), s, c, d, z)
             ec = from%ec(l)
             es = from%es(l)
-            call double_angle(of%nu(l), b*it%norm(l), old_s*old_s, 1.0_wp, s, c*d, z, ec, es)
-            over = 1/(abs(ec) + abs(es))
-            ec = ec*over
-            es = es*over
-            over = 1/z
-            s = s*over
-            c = c*over
-            d = d*over
+            call double_angle(of%nu(l), b*it%norm(l), from%y(l), 1.0_wp, s, c*d, z, ec, es)
+            to%s(l) = s
+            to%c(l) = c
+            to%d(l) = d
+            to%ec(l) = ec
+            to%es(l) = es
+            it%z(l) = z
+        end do
+        call keep_doubled(i, it%triples, it%z, from, to)
+    end subroutine double_triples
+
+    !> Divides the doubled triple by its denominator z and the angle by its size, and doubles the integrals;
+    !> lanes with less than i doublings left stay as they were.
+    pure subroutine keep_doubled(i, left, z, from, to)
+        integer, intent(in) :: i
+        real(wp), intent(in) :: left(lanes), z(lanes)
+        type(lane_triples), intent(in) :: from
+        type(lane_triples), intent(inout) :: to
+        real(wp) :: s, c, d, over, dd, own, ec, es
+        integer :: l
+
+        do l = 1, lanes
+            over = 1/z(l)
+            s = to%s(l)*over
+            c = to%c(l)*over
+            d = to%d(l)*over
+            over = 1/(abs(to%ec(l)) + abs(to%es(l)))
+            ec = to%ec(l)*over
+            es = to%es(l)*over
             dd = from%dd(l)
             own = from%own(l)
-            call double_integrals(old_s, old_d, s, d, dd, own)
-            to%s(l) = merge(s, from%s(l), left >= i)
-            to%c(l) = merge(c, from%c(l), left >= i)
-            to%d(l) = merge(d, from%d(l), left >= i)
-            to%dd(l) = merge(dd, from%dd(l), left >= i)
-            to%own(l) = merge(own, from%own(l), left >= i)
-            to%ec(l) = merge(ec, from%ec(l), left >= i)
-            to%es(l) = merge(es, from%es(l), left >= i)
+            call double_integrals(from%s(l), from%d(l), s, d, dd, own)
+            to%y(l) = merge(s*s, from%y(l), left(l) >= i)
+            to%s(l) = merge(s, from%s(l), left(l) >= i)
+            to%c(l) = merge(c, from%c(l), left(l) >= i)
+            to%d(l) = merge(d, from%d(l), left(l) >= i)
+            to%dd(l) = merge(dd, from%dd(l), left(l) >= i)
+            to%own(l) = merge(own, from%own(l), left(l) >= i)
+            to%ec(l) = merge(ec, from%ec(l), left(l) >= i)
+            to%es(l) = merge(es, from%es(l), left(l) >= i)
         end do
-    end subroutine double_triples
+    end subroutine keep_doubled
 
     !> Momentum at mid-step and at the end; from here on c belongs to p and d to r.
     pure subroutine find_momenta(b, of, it, at, ends)
         real(wp), intent(in) :: b
-        type(lane_orbits), intent(in) :: of
+        type(lane_forms), intent(in) :: of
         type(doubling_lanes), intent(inout) :: it
         type(lane_triples), intent(in) :: at
         type(lane_ends), intent(inout) :: ends
@@ -248,7 +251,7 @@ contains
     !> The turn e z, less 1.
     pure subroutine find_turns(b, of, it, at, ends)
         real(wp), intent(in) :: b
-        type(lane_orbits), intent(in) :: of
+        type(lane_forms), intent(in) :: of
         type(doubling_lanes), intent(inout) :: it
         type(lane_triples), intent(in) :: at
         type(lane_ends), intent(inout) :: ends
@@ -279,10 +282,10 @@ contains
         end do
     end subroutine find_turns
 
-    !> R^T - 1, the columns of K, the shift of the time.
+    !> R^T - 1, the columns of K, the shift of the time, the covector k m + g.
     pure subroutine find_columns(b, of, it, at, ends)
         real(wp), intent(in) :: b
-        type(lane_orbits), intent(in) :: of
+        type(lane_forms), intent(in) :: of
         type(doubling_lanes), intent(in) :: it
         type(lane_triples), intent(in) :: at
         type(lane_ends), intent(inout) :: ends
@@ -310,27 +313,11 @@ contains
             ends%y1(l) = twice*y1
             ends%y2(l) = twice*y2
             ends%y3(l) = twice*y3
+            call long_covector(c_is_cn, of%a(l), b, of%g(l), of%m1(l), of%m2(l), of%m3(l), of%gg(l), &
+                               it%delta(l), of%nu(l), s, c, d, at%dd(l), at%own(l), &
+                               2*(of%rate(l) - it%along(l)*it%cosine(l)), ends%f1(l), ends%f2(l), ends%f3(l))
         end do
     end subroutine find_columns
-
-    !> The covector k m + g of W: see long_covector.
-    pure subroutine find_covectors(b, of, it, at, ends)
-        real(wp), intent(in) :: b
-        type(lane_orbits), intent(in) :: of
-        type(doubling_lanes), intent(in) :: it
-        type(lane_triples), intent(in) :: at
-        type(lane_ends), intent(inout) :: ends
-        logical :: c_is_cn
-        integer :: l
-
-        do l = 1, lanes
-            c_is_cn = it%cn(l) > 0.0_wp
-            call long_covector(c_is_cn, of%a(l), b, of%g(l), of%m1(l), of%m2(l), of%m3(l), of%gg(l), &
-                               it%delta(l), of%nu(l), at%s(l), it%c(l), ends%d(l), &
-                               at%dd(l), at%own(l), 2*(of%rate(l) - it%along(l)*it%cosine(l)), &
-                               ends%f1(l), ends%f2(l), ends%f3(l))
-        end do
-    end subroutine find_covectors
 
     include 'middle_formulas.inc'
 

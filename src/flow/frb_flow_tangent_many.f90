@@ -1,12 +1,11 @@
 !> Many equal bodies with the derivatives of their step: the bodies of a block share SIMD lanes, blocks are
 !> shared among threads.
 module frb_flow_tangent_many
-    use frb_flow_limits, only: plain_largest, middle_limit, period_limit
+    use frb_flow_limits, only: plain_largest
     use frb_flow_tangent_body, only: tangent_body
-    use frb_flow_tangent_far, only: find_far_ends
-    use frb_flow_tangent_lanes, only: lanes, lane_body, lane_orbits, lane_ends, load_lanes, set_forms, &
-        is_served, keep_lanes, join_lanes, finish_lanes
-    use frb_flow_tangent_near, only: find_near_ends
+    use frb_flow_tangent_far, only: step_far
+    use frb_flow_tangent_lanes, only: lanes, near, far, lane_body, lane_orbits, load_lanes, keep_lanes
+    use frb_flow_tangent_near, only: step_near
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
     use frb_status, only: status_ok
@@ -29,19 +28,22 @@ contains
         real(wp), intent(out) :: transition(6, 6, n)
         integer, intent(out) :: code
         type(lane_body) :: of
-        logical :: in_lanes, served(lanes)
+        logical :: in_lanes, whole, served(lanes)
         integer :: first, i, count, one, refused
 
         refused = status_ok
         in_lanes = body%status == status_ok .and. .not. body%needs_rotation .and. is_plain_time(body, h)
         of = body_of_lanes(body, 0.5_wp*h)
-        !$omp parallel do if (n >= 64*lanes) private(served, i, count, one) reduction(max: refused)
+        !$omp parallel do if (n >= 64*lanes) private(whole, served, i, count, one) reduction(max: refused)
         do first = 1, n, lanes
             count = min(lanes, n - first + 1)
-            served = .false.
-            if (in_lanes .and. count > lanes/4) call step_block(of, count, m(1, first), q(1, first), &
-                                                               transition(1, 1, first), served)
-            if (all(served(:count))) cycle
+            whole = .false.
+            if (in_lanes .and. count > lanes/4) then
+                call step_block(of, count, m(1, first), q(1, first), transition(1, 1, first), whole, served)
+            else
+                served = .false.
+            end if
+            if (whole) cycle
             do i = first, first + count - 1
                 if (served(i - first + 1)) cycle
                 call tangent_body(body, h, m(:, i), one, 0, q(:, i), transition(:, :, i))
@@ -68,21 +70,22 @@ contains
     end function body_of_lanes
 
     !> Advances those of a block that the lanes serve; the others are left as they are.
-    subroutine step_block(of, count, m, q, transition, served)
+    pure subroutine step_block(of, count, m, q, transition, whole, served)
         type(lane_body), intent(in) :: of
         integer, intent(in) :: count
         real(wp), intent(inout) :: m(3, count), q(4, count), transition(36, count)
-        logical, intent(out) :: served(lanes)
+        logical, intent(out) :: whole               !! all are served; served is then not set
+        logical, intent(inout) :: served(lanes)
+        real(wp) :: some_m(3, lanes), some_q(4, lanes)
         type(lane_orbits) :: orbits
-        real(wp) :: some_m(3, lanes), some_q(4, lanes), some(36, lanes)
-        integer :: l, near, far
+        integer :: l, nears, fars
 
         associate (o => of%order)
             if (count == lanes) then
-                call load_lanes(of, m(o(1), 1), m(o(2), 1), m(o(3), 1), q, orbits, near, far)
-                if (near + far == lanes) then
-                    call step_lanes(of, near, far, orbits, m, q, transition)
-                    served = .true.
+                call load_lanes(of, m(o(1), 1), m(o(2), 1), m(o(3), 1), q, orbits, nears, fars)
+                whole = max(nears, fars) == lanes
+                if (whole) then
+                    call step_lanes(nears > 0, of, orbits, m, q, transition)
                     return
                 end if
             end if
@@ -90,45 +93,56 @@ contains
                 some_m(:, l) = m(:, min(l, count))
                 some_q(:, l) = q(:, min(l, count))
             end do
-            call load_lanes(of, some_m(o(1), 1), some_m(o(2), 1), some_m(o(3), 1), some_q, orbits, near, far)
+            call load_lanes(of, some_m(o(1), 1), some_m(o(2), 1), some_m(o(3), 1), some_q, orbits, nears, &
+                            fars)
         end associate
-        served = is_served(orbits%reach)
-        if (near + far == 0) return
-        do l = 1, lanes
-            if (.not. served(l)) some_q(:, l) = 1.0_wp
-        end do
-        call step_lanes(of, near, far, orbits, some_m, some_q, some)
+        whole = .false.
+        served = .false.
+        if (nears > 0) call step_some(near, of, orbits, count, m, q, transition, served)
+        if (fars > 0) call step_some(far, of, orbits, count, m, q, transition, served)
+    end subroutine step_block
+
+    !> Advances the lanes of one kind.
+    pure subroutine step_some(kind, of, orbits, count, m, q, transition, served)
+        real(wp), intent(in) :: kind
+        type(lane_body), intent(in) :: of
+        type(lane_orbits), intent(in) :: orbits
+        integer, intent(in) :: count
+        real(wp), intent(inout) :: m(3, count), q(4, count), transition(36, count)
+        logical, intent(inout) :: served(lanes)
+        type(lane_orbits) :: kept
+        real(wp) :: some_m(3, lanes), some_q(4, lanes), some(36, lanes)
+        logical :: here(lanes)
+        integer :: l
+
+        call keep_lanes(kind, orbits, kept, here)
+        some_q = 1.0_wp
         do l = 1, count
-            if (.not. served(l)) cycle
+            if (here(l)) some_q(:, l) = q(:, l)
+        end do
+        call step_lanes(kind <= near, of, kept, some_m, some_q, some)
+        do l = 1, count
+            if (.not. here(l)) cycle
             m(:, l) = some_m(:, l)
             q(:, l) = some_q(:, l)
             transition(:, l) = some(:, l)
         end do
-    end subroutine step_block
+        served = served .or. here
+    end subroutine step_some
 
-    !> Advances a whole block, of which `near` lanes are served by series and `far` by doublings.
-    subroutine step_lanes(of, near, far, orbits, m, q, transition)
+    !> Advances a whole block.
+    pure subroutine step_lanes(is_near, of, orbits, m, q, transition)
+        logical, intent(in) :: is_near
         type(lane_body), intent(in) :: of
-        integer, intent(in) :: near, far
-        type(lane_orbits), intent(inout) :: orbits
+        type(lane_orbits), intent(in) :: orbits
         real(wp), intent(inout) :: m(3, lanes), q(4, lanes), transition(36, lanes)
-        type(lane_orbits) :: some
-        type(lane_ends) :: ends, near_ends, far_ends
 
-        call set_forms(of, orbits)
-        if (far == 0) then
-            call find_near_ends(of%b, orbits, ends)
-        else if (near == 0) then
-            call find_far_ends(of%b, orbits, ends)
-        else
-            call keep_lanes(-1.0_wp, middle_limit, orbits, some)
-            call find_near_ends(of%b, some, near_ends)
-            call keep_lanes(middle_limit, period_limit, orbits, some)
-            call find_far_ends(of%b, some, far_ends)
-            call join_lanes(orbits%reach, near_ends, far_ends, ends)
-        end if
         call clear(transition)
-        call finish_lanes(of, orbits, ends, m, q, transition)
+        if (is_near) then
+            call step_near(of, orbits, m, q, transition)
+        else
+            call step_far(of, orbits, m, q, transition)
+        end if
     end subroutine step_lanes
 
     !> Writes the zeros of [J 0; W E], and the first row of E, which is written later: four numbers fill a

@@ -231,6 +231,8 @@ contains
 
     include 'tangent_short_integrals.inc'
 
+    include 'tangent_tiny_integrals.inc'
+
     include 'tangent_middle_formulas.inc'
 
     include 'tangent_storage.inc'
