@@ -263,11 +263,10 @@ contains
             case default
                 write (number, '(g0)') values(i)
             end select
-            if (equal > 1 .and. dice%pick(2) == 0) then
+            if (dice%pick(2) == 0) equal = 1
+            if (equal > 1) then
                 equal = 1 + dice%pick(equal)
                 text = text//achar(iachar('0') + equal)//'*'
-            else
-                equal = 1
             end if
             text = text//trim(adjustl(number))
             i = i + equal
