@@ -1,14 +1,16 @@
 !> The open loop: scenes that refuse and agree, torques counted where drifts are joined.
 module frb_test_open_scenes
     use frb_checks, only: tally, worst_of
+    use frb_extrapolation, only: extrapolate
     use frb_free_flow, only: rigid_body
     use frb_kinds, only: wp
     use frb_scenes, only: heavy_top
     use frb_schemes, only: scheme_names, splitting_scheme
     use frb_splitting, only: integrate
-    use frb_status, only: status_bad_time, status_stopped
+    use frb_status, only: status_bad_time, status_ok, status_stopped
     use frb_torque, only: body_scene
     use frb_torque_cases, only: dipoles, distance, known_top, recorder, start_of_group, top_case
+    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
     implicit none
     private
 
@@ -24,6 +26,8 @@ module frb_test_open_scenes
         integer :: asked = 0                    ! torques so far
         integer :: agreed = 0                   ! calls of the hook so far
         integer :: refuse_at = 0                ! torque that is refused
+        integer :: spoil_at = 0                 ! torque that is NaN
+        integer :: said_at = 0                  ! first call of the hook with a code of an error
         integer :: others_refuse_at = 0         ! call of the hook at which another process refuses
         integer :: last_code = 0                ! code in the last call of the hook
     contains
@@ -44,9 +48,10 @@ contains
     subroutine test_open_scenes(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('open-scenes', 23)
+        call t%open_suite('open-scenes', 25)
         call test_refusing_scenes(t)
         call test_agreeing(t)
+        call test_extrapolate(t)
         call test_joined(t)
         call t%close_suite()
     end subroutine test_open_scenes
@@ -60,6 +65,7 @@ contains
         call self%top%torque(q, t, tau, stat)
         self%asked = self%asked + 1
         if (self%asked == self%refuse_at) stat = own_code
+        if (self%asked == self%spoil_at) tau(2) = ieee_value(t, ieee_quiet_nan)
     end subroutine shared_torque
 
     subroutine shared_agree(self, code)
@@ -68,6 +74,7 @@ contains
 
         self%agreed = self%agreed + 1
         self%last_code = code
+        if (code /= status_ok .and. self%said_at == 0) self%said_at = self%agreed
         if (self%agreed == self%others_refuse_at) code = max(code, own_code)
     end subroutine shared_agree
 
@@ -115,6 +122,49 @@ contains
             call t%ok(trim(scheme_names(k))//'-ends-with-the-last-whole-step-before-a-refusal', good)
         end do
     end subroutine test_refusing_scenes
+
+    !> Two processes, one after the other: a torque is refused, or is NaN, on the first, and the second hears
+    !> of it by the hook alone. Both ask for the same torques, or one of them would wait for ever.
+    subroutine test_extrapolate(t)
+        type(tally), intent(inout) :: t
+        type(top_case) :: item
+        type(shared_top) :: one, other
+        real(wp) :: m(3), q(4), m_other(3), q_other(4)
+        integer :: i, stat, stat_other
+        logical :: refused, spoilt
+
+        item = known_top(2)
+        refused = .true.
+        spoilt = .true.
+        do i = 1, 60
+            one = shared_top(top=item%top, refuse_at=i)
+            m = item%m0
+            q = item%q0
+            call extrapolate(item%body, one, 2.0_wp, m, q, 1.0e-9_wp, stat=stat)
+            other = shared_top(top=item%top, others_refuse_at=one%said_at)
+            m_other = item%m0
+            q_other = item%q0
+            call extrapolate(item%body, other, 2.0_wp, m_other, q_other, 1.0e-9_wp, stat=stat_other)
+            ! The second torque only serves the first guess of a step.
+            refused = refused .and. stat == merge(status_ok, own_code, i == 2) .and. stat_other == stat &
+                      .and. one%said_at > 0 &
+                      .and. one%asked == other%asked .and. one%agreed == other%agreed
+            one = shared_top(top=item%top, spoil_at=i)
+            m = item%m0
+            q = item%q0
+            call extrapolate(item%body, one, 2.0_wp, m, q, 1.0e-9_wp, stat=stat)
+            other = shared_top(top=item%top, others_refuse_at=one%said_at)
+            m_other = item%m0
+            q_other = item%q0
+            call extrapolate(item%body, other, 2.0_wp, m_other, q_other, 1.0e-9_wp, stat=stat_other)
+            spoilt = spoilt .and. one%said_at > 0 .and. one%asked == other%asked &
+                     .and. one%agreed == other%agreed &
+                     .and. (stat == status_ok .eqv. stat_other == status_ok) &
+                     .and. all(abs(m - m_other) <= 0.0_wp)
+        end do
+        call t%ok('processes-that-extrapolate-end-together-where-one-refuses', refused)
+        call t%ok('processes-that-extrapolate-stay-together-where-one-has-nan', spoilt)
+    end subroutine test_extrapolate
 
     !> The hook gets every code before it takes effect, and the code that it returns ends the run.
     subroutine test_agreeing(t)

@@ -210,7 +210,7 @@ contains
         integer, intent(out) :: code
         class(body_observer), intent(inout), optional :: observer
         real(wp) :: start, left, left_before, h, least, guess, ratio, before, reach, few
-        integer :: short_steps, refused
+        integer :: short_steps
         logical :: accepted, last
 
         start = t_now
@@ -224,7 +224,8 @@ contains
         short_steps = 0
         if (present(observer)) call show(moved, scene, 0_int64, t_now, observer, code)
         do while (code == status_ok .and. abs(left) > 0.0_wp)
-            if (.not. moved%torque_known) call ask_torque(moved, scene, t_now, told%torques, code)
+            call know_torque(moved, scene, t_now, told%torques, code)
+            if (code /= status_ok) exit
             if (.not. guess > 0.0_wp) then
                 guess = first_step(moved, scene, t_now, left, told%tolerance, told%torques)
                 h = guess
@@ -239,13 +240,13 @@ contains
             last = h >= abs(left)
             if (last) h = abs(left)
             call try_step(moved, scene, t_now, sign(h, time), h > 1.01_wp*reach, &
-                          h*moved%core%beta*norm3(moved%x(1:3)) < few, told%torques, refused)
-            if (code == status_ok) code = refused
+                          h*moved%core%beta*norm3(moved%x(1:3)) < few, told%torques, code)
+            call agree_on_step(moved, scene, code)
+            if (code /= status_ok) exit
             ! Only NaN can cause rejected steps without end.
             ratio = min(moved%error, 1.0_wp)/told%tolerance
             accepted = ratio <= 1.0_wp .or. fixed > 0.0_wp .or. h <= least
-            if (code == status_ok .and. accepted .and. .not. moved%is_finite) code = status_bad_torque
-            call scene%agree(code)
+            if (accepted .and. .not. moved%is_finite) code = status_bad_torque
             if (code /= status_ok) exit
             if (.not. accepted) then
                 told%rejected = told%rejected + 1
@@ -275,6 +276,36 @@ contains
             before = h
         end do
     end subroutine run_steps
+
+    !> The torque at the start of a step, unless it is known: on all processes, or on none.
+    subroutine know_torque(moved, scene, t_now, asked, code)
+        type(extrapolated_body), intent(inout) :: moved
+        class(body_scene), intent(inout) :: scene
+        real(wp), intent(in) :: t_now
+        integer(int64), intent(inout) :: asked
+        integer, intent(out) :: code
+
+        code = status_ok
+        if (moved%torque_known) return
+        call ask_torque(moved, scene, t_now, asked, code)
+        call scene%agree(code)
+    end subroutine know_torque
+
+    !> All processes agree upon the code of a tried step, and upon whether it is finite: else one of them
+    !> would reject a step that others accept.
+    subroutine agree_on_step(moved, scene, code)
+        type(extrapolated_body), intent(inout) :: moved
+        class(body_scene), intent(inout) :: scene
+        integer, intent(inout) :: code
+        integer :: finite
+
+        call scene%agree(code)
+        if (code /= status_ok) return
+        finite = merge(status_ok, status_bad_torque, moved%is_finite)
+        call scene%agree(finite)
+        moved%is_finite = finite == status_ok
+        if (.not. moved%is_finite) moved%error = 1.0_wp
+    end subroutine agree_on_step
 
     !> Adds an accepted step to the report.
     pure subroutine note_step(told, h, error, last)

@@ -50,7 +50,8 @@ contains
         call accept_step(ahead, h, code)
         ! If the scene refuses this state, it does so again when a step reaches it.
         if (code == status_ok) call ask_torque(ahead, scene, t + h, asked, code)
-        torque = ahead%tau
+        call scene%agree(code)
+        torque = merge(ahead%tau, 0.0_wp, code == status_ok)
     end function torque_ahead
 
     !> The step h, or near the end an equal part of the time left, so that no very short step remains; a

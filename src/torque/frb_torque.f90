@@ -257,11 +257,11 @@ contains
 
     !> The hook of runs on many processes. `integrate` calls it wherever it may have to end the run: once at
     !> the start, after each torque, after a drift that closes a step, after each drift of the user's and
-    !> after each observer, with the code of this process, mostly `status_ok`; the returned code decides. A
-    !> scene that shares its torques among processes overrides it with the largest code of all (MPI_Allreduce
-    !> with MPI_MAX): then all processes end together, whichever of them refuses. Its own codes should then be
-    !> positive; scheme, step, numbers of steps, observer and drift must be the same on all processes. The
-    !> default does nothing.
+    !> after each observer, with the code of this process, mostly `status_ok`; the returned code decides.
+    !> `extrapolate` does the same, and asks too whether a step is finite everywhere. A scene that shares its
+    !> torques among processes overrides it with the largest code of all (MPI_Allreduce with MPI_MAX): then
+    !> all processes end together, whichever of them refuses. Its own codes should then be positive; scheme,
+    !> step, numbers of steps, observer and drift must be the same on all processes. The default does nothing.
     subroutine body_alone(self, code)
         class(body_scene), intent(inout) :: self
         integer, intent(inout) :: code
