@@ -260,7 +260,7 @@ contains
             m = [0.3_wp, 0.8_wp, -0.5_wp]
             q = [0.5_wp, -0.5_wp, 0.5_wp, 0.5_wp]
             call integrate(rigid_body(moments(:, k)), splitting_scheme('strang'), weightless, 5.0_wp, &
-                           t%long(20000), m, q, compensated=.true.)
+                           t%many(20000), m, q, compensated=.true.)
             write (digit, '(i0)') k
             call t%at_most('compensated-long-turns-keep-the-norm-of-body-'//digit, abs(norm_defect(q)), 2*eps)
         end do
