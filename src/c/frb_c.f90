@@ -109,7 +109,8 @@ contains
         real(c_double), value :: h
         integer(c_int) :: stat
         type(body_core), pointer :: core(:)
-        real(c_double), pointer, contiguous :: words(:, :), m_of(:, :), q_of(:, :)
+        real(c_double), pointer, contiguous :: words(:, :)
+        real(c_double), pointer :: m_of(:, :), q_of(:, :)
         integer :: bodies, code
         logical :: packed
 
@@ -124,8 +125,12 @@ contains
         stat = status_bad_momentum
         if (.not. c_associated(m)) return
         call c_f_pointer(m, m_of, [ldm, n])
+        m_of => m_of(:3, :)
         nullify (q_of)
-        if (c_associated(q)) call c_f_pointer(q, q_of, [ldq, n])
+        if (c_associated(q)) then
+            call c_f_pointer(q, q_of, [ldq, n])
+            q_of => q_of(:4, :)
+        end if
         bodies = merge(1, int(n), ldb == 0)
         packed = ldb == 0 .or. ldb == body_doubles
         if (packed) then
@@ -133,7 +138,7 @@ contains
             packed = all_usable(core)
         end if
         if (packed) then
-            call flow_many(core, ldb == 0, [h], m_of, code, q_of)
+            call flow_many(core, ldb == 0, [h], int(n), m_of, code, q_of)
         else
             call c_f_pointer(body, words, [max(ldb, int(body_doubles, c_size_t)), int(bodies, c_size_t)])
             call flow_strided(words, ldb == 0, h, m_of, code, q_of)
@@ -146,19 +151,20 @@ contains
         real(c_double), intent(in), target :: words(:, :)   !! bodies: one, or as many as states
         logical, intent(in) :: alike                        !! the first is meant for all
         real(c_double), intent(in) :: h
-        real(c_double), intent(inout) :: m(:, :)            !! the first 3 rows
+        real(c_double), intent(inout) :: m(:, :)            !! (3, n)
         integer, intent(out) :: code
-        real(c_double), intent(inout), optional :: q(:, :)  !! the first 4 rows
+        real(c_double), intent(inout), optional :: q(:, :)  !! (4, n)
         type(body_core), pointer :: given
         type(body_core) :: part(chunk)
-        integer :: first, last, bodies, code_here, i
+        integer :: first, last, count, bodies, code_here, i
 
         code = status_ok
         bodies = 1
         do first = 1, size(m, 2), chunk
-            last = min(first + chunk - 1, size(m, 2))
+            count = min(chunk, size(m, 2) - first + 1)
+            last = first + count - 1
             if (size(words, 2) > 1 .or. first == 1) then
-                bodies = min(last - first + 1, size(words, 2))
+                bodies = min(count, size(words, 2))
                 do i = 1, bodies
                     call c_f_pointer(c_loc(words(1, first + i - 1)), given)
                     part(i) = body_core()
@@ -166,9 +172,10 @@ contains
                 end do
             end if
             if (present(q)) then
-                call flow_many(part(:bodies), alike, [h], m(:, first:last), code_here, q(:, first:last))
+                call flow_many(part(:bodies), alike, [h], count, m(:, first:last), code_here, &
+                               q(:, first:last))
             else
-                call flow_many(part(:bodies), alike, [h], m(:, first:last), code_here)
+                call flow_many(part(:bodies), alike, [h], count, m(:, first:last), code_here)
             end if
             code = max(code, code_here)
         end do

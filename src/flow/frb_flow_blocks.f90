@@ -1,7 +1,7 @@
 !> Blocks of bodies for frb_flow_lanes: constants of equal or different bodies, and vectors in body axes taken
 !> to cyclic axes, the middle moment second, and back.
 module frb_flow_blocks
-    use frb_flow_lanes, only: lanes, vector, lane_bodies, workspace, step_cyclic
+    use frb_flow_lanes, only: lanes, vector, classes, limits, lane_bodies, workspace, measure, step_lanes
     use frb_flow_lanes_long, only: step_long
     use frb_flow_limits, only: plain_largest
     use frb_inertia, only: body_core
@@ -11,7 +11,7 @@ module frb_flow_blocks
     implicit none
     private
 
-    public :: block_of_bodies, set_bodies, step_lanes, whole
+    public :: block_of_bodies, set_bodies, step_block, whole
 
     integer, parameter :: same_axes = 1, shifted_axes = 2, turned_axes = 3
 
@@ -44,7 +44,7 @@ contains
         integer, intent(in) :: first, count
         type(block_of_bodies), intent(inout) :: block
         real(wp) :: t(lanes), axis
-        integer(int64) :: plain, turned, apart
+        integer(int64) :: plain_lanes, turned, apart
         integer :: l, full, last
 
         full = whole(count)
@@ -54,14 +54,14 @@ contains
         else
             last = first + count - 1
             t(:count) = merge(h(first:last), 0.0_wp, ieee_is_finite(h(first:last)))
-            t(count + 1:full) = t(count)
+            t(count + 1:full) = merge(h(last), 0.0_wp, ieee_is_finite(h(last)))
             ! A time of 0 goes on as one that is too large does: by itself.
             t(:full) = merge(0.5_wp*t(:full), 0.0_wp, abs(t(:full)) < plain_largest)
         end if
-        call scale_by_time(full, t, block%lane, block%of, plain)
+        call scale_by_time(full, t, block%lane, block%of, plain_lanes)
         block%of%alike = alike
         if (alike) call set_polynomial(body(1), full, t, block%of)
-        block%all_plain = plain == full
+        block%all_plain = plain_lanes == full
         turned = 0
         apart = 0
         do l = 1, full
@@ -74,11 +74,11 @@ contains
         if (block%axes_are == same_axes) block%column = 1 + modulo([4, 5, 6] - int(abs(block%lane(1))), 3)
         if (block%axes_are /= turned_axes) return
         do l = 1, full
-            associate (one => body(min(size(body), first + min(l, count) - 1)))
-                if (one%parity > 0) then
-                    block%axes(l, :, :) = one%axes(:, one%order)
+            associate (given => body(min(size(body), first + min(l, count) - 1)))
+                if (given%parity > 0) then
+                    block%axes(l, :, :) = given%axes(:, given%order)
                 else
-                    block%axes(l, :, :) = one%axes(:, one%order([3, 2, 1]))
+                    block%axes(l, :, :) = given%axes(:, given%order([3, 2, 1]))
                 end if
             end associate
         end do
@@ -164,25 +164,25 @@ contains
     end subroutine set_polynomial
 
     !> Times t, and with the axes in cyclic order, the middle moment second: of odd ones the first and the
-    !> last change places. `plain` lanes turn by no angle near overflow; the others get 0.
-    pure subroutine scale_by_time(n, t, lane, of, plain)
+    !> last change places. `plain_lanes` turn by no angle near overflow; the others get 0.
+    pure subroutine scale_by_time(n, t, lane, of, plain_lanes)
         integer, intent(in) :: n
         real(wp), intent(in) :: t(n)
         real(wp), intent(inout) :: lane(n)
         type(lane_bodies), intent(inout) :: of
-        integer(int64), intent(out) :: plain
+        integer(int64), intent(out) :: plain_lanes
         real(wp) :: a, b, g, a1, a3, time, rate
         logical :: odd
         integer :: l
 
-        plain = 0
+        plain_lanes = 0
         do l = 1, n
             a1 = merge(of%first(l), 0.0_wp, of%first(l) < plain_largest)
             rate = abs(a1*t(l))
             time = merge(t(l), 0.0_wp, rate < plain_largest)
             time = merge(time, 0.0_wp, rate > 0)
             time = merge(time, 0.0_wp, abs(lane(l)) > 0)
-            plain = plain + merge(1_int64, 0_int64, abs(time) > 0)
+            plain_lanes = plain_lanes + merge(1_int64, 0_int64, abs(time) > 0)
             a1 = a1*time
             a3 = min(of%last(l), plain_largest)*time
             a = of%a(l)*time
@@ -257,42 +257,91 @@ contains
         end do
     end subroutine from_cyclic
 
-    !> The step of n lanes with momenta (x1, x2, x3) in body axes, plain numbers: see step_cyclic. What comes
-    !> is in columns as `block` has them.
-    pure subroutine step_lanes(n, with_attitude, block, x1, x2, x3, work, all_served)
+    !> The step of n lanes with momenta (x1, x2, x3) in body axes, plain numbers: increments and,
+    !> with_attitude, turns in columns as `block` has them. Lanes of a size beyond the limits do not move.
+    pure subroutine step_block(n, with_attitude, block, x1, x2, x3, work, all_moved)
         integer, intent(in) :: n
         logical, intent(in) :: with_attitude
         type(block_of_bodies), intent(in) :: block
         real(wp), intent(in) :: x1(n), x2(n), x3(n)
         type(workspace), intent(inout) :: work
-        logical, intent(out) :: all_served
+        logical, intent(out) :: all_moved
         real(wp) :: cyclic(lanes, 3)
 
         if (block%axes_are /= same_axes) then
             call to_cyclic(n, block, x1, x2, x3, cyclic)
-            call step_any(n, with_attitude, block%of, cyclic(:, 1), cyclic(:, 2), cyclic(:, 3), work, &
-                          all_served)
+            call step_cyclic(n, with_attitude, block%of, cyclic(:, 1), cyclic(:, 2), cyclic(:, 3), work, &
+                             all_moved)
             call from_cyclic(n, block, work%d)
             if (with_attitude) call from_cyclic(n, block, work%w)
         else if (block%column(1) == 1) then
-            call step_any(n, with_attitude, block%of, x1, x2, x3, work, all_served)
+            call step_cyclic(n, with_attitude, block%of, x1, x2, x3, work, all_moved)
         else if (block%column(1) == 2) then
-            call step_any(n, with_attitude, block%of, x3, x1, x2, work, all_served)
+            call step_cyclic(n, with_attitude, block%of, x3, x1, x2, work, all_moved)
         else
-            call step_any(n, with_attitude, block%of, x2, x3, x1, work, all_served)
+            call step_cyclic(n, with_attitude, block%of, x2, x3, x1, work, all_moved)
         end if
-    end subroutine step_lanes
+    end subroutine step_block
 
-    pure subroutine step_any(n, with_attitude, of, x1, x2, x3, work, all_served)
+    !> The same in cyclic axes. Lanes of several classes: one class after another, while the other lanes stand
+    !> still.
+    pure subroutine step_cyclic(n, with_attitude, of, x1, x2, x3, work, all_moved)
         integer, intent(in) :: n
         logical, intent(in) :: with_attitude
         type(lane_bodies), intent(in) :: of
         real(wp), intent(in) :: x1(n), x2(n), x3(n)
         type(workspace), intent(inout) :: work
-        logical, intent(out) :: all_served
+        logical, intent(out) :: all_moved
+        type(workspace) :: some
+        real(wp) :: m1(lanes), m2(lanes), m3(lanes)
+        logical :: mine(lanes)
+        integer :: many(0:classes), class, l
 
-        call step_cyclic(n, with_attitude, of, x1, x2, x3, work, all_served)
-        if (.not. all_served) call step_long(n, with_attitude, of, x1, x2, x3, work, all_served)
-    end subroutine step_any
+        call measure(n, of, x1, x2, x3, work, many)
+        all_moved = many(classes) == n
+        do class = 1, classes
+            if (many(class) - many(class - 1) == n) then
+                call step_class(class, n, with_attitude, of, x1, x2, x3, work)
+                return
+            end if
+        end do
+        work%d = 0.0_wp
+        work%w0 = 0.0_wp
+        work%w = 0.0_wp
+        do class = 1, classes
+            if (many(class) == many(class - 1)) cycle
+            mine(:n) = work%size(:n) <= limits(class)
+            if (many(class - 1) > 0) mine(:n) = mine(:n) .and. work%size(:n) > limits(class - 1)
+            m1(:n) = merge(x1, 0.0_wp, mine(:n))
+            m2(:n) = merge(x2, 0.0_wp, mine(:n))
+            m3(:n) = merge(x3, 0.0_wp, mine(:n))
+            some%p(:n) = merge(work%p(:n), 0.0_wp, mine(:n))
+            some%r(:n) = merge(work%r(:n), 0.0_wp, mine(:n))
+            some%size(:n) = merge(work%size(:n), 0.0_wp, mine(:n))
+            call step_class(class, n, with_attitude, of, m1, m2, m3, some)
+            do l = 1, n
+                if (.not. mine(l)) cycle
+                work%d(l, :) = some%d(l, :)
+                if (.not. with_attitude) cycle
+                work%w0(l) = some%w0(l)
+                work%w(l, :) = some%w(l, :)
+            end do
+        end do
+    end subroutine step_cyclic
+
+    !> The step of lanes of one class.
+    pure subroutine step_class(class, n, with_attitude, of, x1, x2, x3, work)
+        integer, intent(in) :: class, n
+        logical, intent(in) :: with_attitude
+        type(lane_bodies), intent(in) :: of
+        real(wp), intent(in) :: x1(n), x2(n), x3(n)
+        type(workspace), intent(inout) :: work
+
+        if (class == classes) then
+            call step_long(n, with_attitude, of, x1, x2, x3, work)
+        else
+            call step_lanes(class, n, with_attitude, of, x1, x2, x3, work)
+        end if
+    end subroutine step_class
 
 end module frb_flow_blocks

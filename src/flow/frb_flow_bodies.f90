@@ -1,13 +1,12 @@
 !> Many free bodies at once: the bodies of a block share SIMD lanes, blocks are shared among threads.
 module frb_flow_bodies
-    use frb_flow_blocks, only: block_of_bodies, set_bodies, step_lanes, whole
+    use frb_flow_blocks, only: block_of_bodies, set_bodies, step_block, whole
     use frb_flow_lanes, only: lanes, workspace
-    use frb_flow_lanes_long, only: is_near
-    use frb_flow_limits, only: plain_largest, plain_smallest
+    use frb_flow_limits, only: period_limit, plain_largest, plain_smallest
     use frb_flow_one, only: flow_body
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
-    use frb_status, only: status_ok, status_bad_time
+    use frb_status, only: return_or_stop, status_ok, status_bad_count, status_bad_time
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_is_nan
     implicit none
     private
@@ -16,45 +15,60 @@ module frb_flow_bodies
 
 contains
 
-    !> Advances the bodies whose states are the rows m(1:3, :) and q(1:4, :), of any strides: see flow_columns.
-    subroutine flow_many(body, alike, h, m, code, q)
+    !> Advances n bodies whose states are the rows m(3, n) and q(4, n), of any strides: see flow_columns.
+    !> Stops without `stat`.
+    subroutine flow_many(body, alike, h, n, m, stat, q)
         type(body_core), intent(in) :: body(:)
         logical, intent(in) :: alike
         real(wp), intent(in) :: h(:)
+        integer, intent(in) :: n
         real(wp), intent(inout) :: m(:, :)
-        integer, intent(out) :: code
+        integer, intent(out), optional :: stat
         real(wp), intent(inout), optional :: q(:, :)
+        integer :: code
 
-        if (present(q)) then
-            call flow_columns(body, alike, h, m(1, :), m(2, :), m(3, :), code, q(1, :), q(2, :), &
-                              q(3, :), q(4, :))
-        else
-            call flow_columns(body, alike, h, m(1, :), m(2, :), m(3, :), code)
+        code = status_bad_count
+        if (size(m, 1) == 3 .and. .not. present(q)) then
+            call flow_columns(body, alike, h, n, m(1, :), m(2, :), m(3, :), code)
+        else if (present(q)) then
+            if (size(m, 1) == 3 .and. size(q, 1) == 4) then
+                call flow_columns(body, alike, h, n, m(1, :), m(2, :), m(3, :), code, q(1, :), q(2, :), &
+                                  q(3, :), q(4, :))
+            end if
         end if
+        call return_or_stop(code, 'free_flow', stat)
     end subroutine flow_many
 
-    !> Advances size(m1) bodies in blocks, one body per SIMD lane. The components of the states are vectors of
-    !> any stride: rows or columns of arrays. q0 to q3: all or none. The blocks are independent: with -fopenmp
-    !> they are shared among the threads. What becomes of a body does not depend on the others: the same bits
-    !> for any threads and parts of a batch. (So one body takes a block too, though a call for it alone is
-    !> faster.)
-    subroutine flow_columns(body, alike, h, m1, m2, m3, code, q0, q1, q2, q3)
-        type(body_core), intent(in) :: body(:)      !! one for all or one for each
-        logical, intent(in) :: alike                !! body(1) is meant for all, also for one
-        real(wp), intent(in) :: h(:)                !! one for all or one for each
+    !> Advances n bodies in blocks, one body per SIMD lane. The components of the states are vectors of any
+    !> stride: rows or columns of arrays. The blocks are independent: with -fopenmp they are shared among the
+    !> threads. What becomes of a body does not depend on the others: the same bits for any threads and parts
+    !> of a batch. (So one body takes a block too, though a call for it alone is faster.) GCC reads the
+    !> address of an optional argument that is `contiguous`, absent or not, where it is passed on.
+    subroutine flow_columns(body, alike, h, n, m1, m2, m3, code, q0, q1, q2, q3)
+        type(body_core), intent(in) :: body(:)      !! one for all or n
+        logical, intent(in) :: alike                !! body(1) is meant for all, whatever n
+        real(wp), intent(in) :: h(:)                !! one for all or n
+        integer, intent(in) :: n
         real(wp), intent(inout) :: m1(:), m2(:), m3(:)
         integer, intent(out) :: code                !! the largest of those of the bodies
-        real(wp), intent(inout), optional :: q0(:), q1(:), q2(:), q3(:)
+        real(wp), intent(inout), optional :: q0(:), q1(:), q2(:), q3(:)     !! all or none
         type(block_of_bodies) :: block
         logical :: blocks_differ
-        integer :: first, count, n, refused
+        integer :: first, count, refused
 
+        code = status_bad_count
+        if (all(size(body) /= [1, n]) .or. all(size(h) /= [1, n])) return
+        if (any([size(m1), size(m2), size(m3)] /= n)) return
+        if (present(q0) .and. present(q1) .and. present(q2) .and. present(q3)) then
+            if (any([size(q0), size(q1), size(q2), size(q3)] /= n)) return
+        else if (present(q0) .or. present(q1) .or. present(q2) .or. present(q3)) then
+            return
+        end if
         code = status_ok
         if (size(body) == 1) code = body(1)%status
         if (size(h) == 1 .and. code == status_ok) then
             if (.not. ieee_is_finite(h(1))) code = status_bad_time
         end if
-        n = size(m1)
         if (code /= status_ok .or. n == 0) return
         refused = status_ok
         blocks_differ = max(size(body), size(h)) > 1
@@ -79,22 +93,22 @@ contains
         integer, intent(inout) :: refused
         real(wp), intent(inout), optional :: q0(:), q1(:), q2(:), q3(:)
         type(workspace) :: work
-        real(wp) :: m(lanes, 3)
+        real(wp) :: m(lanes, 3), total(lanes)
         logical :: all_moved
         integer :: l, high, step
 
         if (present(q0)) then
-            call measure_attitudes(first, count, q0, q1, q2, q3, work%reach)
+            call measure_attitudes(first, count, q0, q1, q2, q3, total)
         else
-            work%reach(:count) = 0.0_wp
+            total(:count) = 0.0_wp
         end if
-        call load_momenta(first, count, whole(count), work%reach, m1, m2, m3, m)
+        call load_momenta(first, count, whole(count), total, m1, m2, m3, m)
         if (.not. block%all_plain) call stop_lanes(whole(count), block%lane, m)
-        call step_lanes(whole(count), present(q0), block, m(:, 1), m(:, 2), m(:, 3), work, all_moved)
+        call step_block(whole(count), present(q0), block, m(:, 1), m(:, 2), m(:, 3), work, all_moved)
         step = merge(count, 1, all_moved)
         do l = 1, count, step
             high = l + step - 1
-            if (all_moved .or. is_near(work%reach(l))) then
+            if (all_moved .or. work%size(l) <= period_limit) then
                 associate (d => work%d, w => work%w, c => block%column)
                     call add(first, l, high, m, d(:, c(1)), d(:, c(2)), d(:, c(3)), m1, m2, m3)
                     if (.not. present(q0)) cycle
@@ -111,7 +125,7 @@ contains
     pure subroutine measure_attitudes(first, count, q0, q1, q2, q3, total)
         integer, intent(in) :: first, count
         real(wp), intent(in) :: q0(:), q1(:), q2(:), q3(:)
-        real(wp), intent(inout) :: total(lanes)
+        real(wp), intent(out) :: total(lanes)
         real(wp) :: sizes
         integer :: l, k
 
@@ -171,17 +185,17 @@ contains
         real(wp) :: m(3), q(4)
         integer :: code
 
-        associate (one => body(min(size(body), k)), time => h(min(size(h), k)))
+        associate (its_body => body(min(size(body), k)), time => h(min(size(h), k)))
             m = [m1(k), m2(k), m3(k)]
             if (present(q0)) then
                 q = [q0(k), q1(k), q2(k), q3(k)]
-                call flow_body(one, time, m, code, q)
+                call flow_body(its_body, time, m, code, q)
                 q0(k) = q(1)
                 q1(k) = q(2)
                 q2(k) = q(3)
                 q3(k) = q(4)
             else
-                call flow_body(one, time, m, code)
+                call flow_body(its_body, time, m, code)
             end if
         end associate
         m1(k) = m(1)

@@ -21,23 +21,25 @@
 !> The loops are short, so that a processor has several vectors in work; each formula is called once in this
 !> module: GCC inlines only such private copies (a formula of another module took 2 to 4 times longer).
 module frb_flow_lanes
-    use frb_flow_limits, only: short_limit, middle_limit, plain_smallest
+    use frb_flow_limits, only: short_limit, middle_limit, period_limit, plain_smallest
     use frb_kinds, only: wp
     use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
-    public :: lanes, vector, lane_bodies, workspace, step_cyclic, is_served
+    public :: lanes, vector, classes, limits, lane_bodies, workspace, measure, step_lanes
 
     integer, parameter :: lanes = 64    !! bodies in a block
     integer, parameter :: vector = 8    !! blocks are filled to whole vectors: no loop ends with a part
 
-    !> How far a step reaches: max(p, r) and, in the same unit, the square of the half angle.
-    real(wp), parameter :: angle_as_reach = 0.16_wp
-    integer, parameter :: classes = 3           !! tiny, short and middle steps
-    real(wp), parameter :: limits(0:classes) = [-1.0_wp, 8.0e-5_wp, short_limit, 26*middle_limit]
+    !> Size of a step: max(p, r) and, in the same unit, the square of the half angle.
+    real(wp), parameter :: angle_as_size = 0.16_wp
+    !> Tiny, short and middle steps, and those of frb_flow_lanes_long, by the largest size of each.
+    integer, parameter :: classes = 4
+    real(wp), parameter :: limits(0:classes) = [-1.0_wp, 8.0e-5_wp, short_limit, 26*middle_limit, &
+                                                period_limit]
 
-    real(wp), parameter :: smallest_square = plain_smallest**2, no_reach = 1.0e300_wp   !! goes one by one
+    real(wp), parameter :: smallest_square = plain_smallest**2, no_lane = 1.0e300_wp    !! goes one by one
 
     !> Constants of the bodies of a block in cyclic axes, the middle moment second, times t = h/2.
     type :: lane_bodies
@@ -52,7 +54,7 @@ module frb_flow_lanes
 
     !> Numbers that one loop computes and another one uses.
     type :: workspace
-        real(wp) :: p(lanes), r(lanes), reach(lanes)
+        real(wp) :: p(lanes), r(lanes), size(lanes)
         real(wp) :: y(lanes), part(lanes)                           !! s^2; part of t where its series begins
         real(wp) :: scd(lanes), d0(lanes)                           !! s c d, c d D0
         real(wp) :: n1(lanes), n2(lanes), n3(lanes)                 !! L times d0
@@ -64,39 +66,15 @@ module frb_flow_lanes
 
 contains
 
-    !> The step of n lanes with momenta (x1, x2, x3) in cyclic axes, plain numbers: increments, and
-    !> the turn if with_attitude. Lanes that are not served, see is_served, have none.
-    pure subroutine step_cyclic(n, with_attitude, of, x1, x2, x3, work, all_served)
-        integer, intent(in) :: n
-        logical, intent(in) :: with_attitude
-        type(lane_bodies), intent(in) :: of
-        real(wp), intent(in) :: x1(n), x2(n), x3(n)
-        type(workspace), intent(inout) :: work
-        logical, intent(out) :: all_served
-        integer(int64) :: many(0:classes)
-        integer :: class
-
-        call measure(n, of, x1, x2, x3, work, many(1:))
-        many(0) = 0
-        if (.not. of%alike) many(1) = 0
-        all_served = many(classes) == n
-        do class = 1, classes
-            if (many(class) - many(class - 1) == n) then
-                call step_class(class, n, with_attitude, of, x1, x2, x3, work)
-                return
-            end if
-        end do
-        call step_mixed(n, with_attitude, of, x1, x2, x3, work)
-    end subroutine step_cyclic
-
-    !> Constants of the motion, and the number of lanes whose reach is within each class.
+    !> Constants of the motion and sizes of the steps of n lanes with momenta (x1, x2, x3) in cyclic axes,
+    !> plain numbers; the number of lanes within the limit of each class.
     pure subroutine measure(n, of, x1, x2, x3, work, many)
         integer, intent(in) :: n
         type(lane_bodies), intent(in) :: of
         real(wp), intent(in) :: x1(n), x2(n), x3(n)
         type(workspace), intent(inout) :: work
-        integer(int64), intent(out) :: many(classes)
-        real(wp) :: s1, s2, s3, gg, k, p, r, reach
+        integer, intent(out) :: many(0:classes)
+        real(wp) :: s1, s2, s3, gg, k, p, r, step
         integer(int64) :: tiny, short, middle
         integer :: l
 
@@ -111,65 +89,22 @@ contains
             p = of%bg(l)*s1 + k
             r = of%ab(l)*s3 + k
             gg = s1 + (s2 + s3)
-            reach = max(p, r, angle_as_reach*(of%rate(l)*(of%rate(l)*gg)))
-            reach = merge(no_reach, reach, gg <= smallest_square)
+            step = max(p, r, angle_as_size*(of%rate(l)*(of%rate(l)*gg)))
+            step = merge(no_lane, step, gg <= smallest_square)
             work%p(l) = p
             work%r(l) = r
-            work%reach(l) = reach
-            tiny = tiny + merge(1_int64, 0_int64, reach <= limits(1))
-            short = short + merge(1_int64, 0_int64, reach <= limits(2))
-            middle = middle + merge(1_int64, 0_int64, reach <= limits(3))
+            work%size(l) = step
+            tiny = tiny + merge(1_int64, 0_int64, step <= limits(1))
+            short = short + merge(1_int64, 0_int64, step <= limits(2))
+            middle = middle + merge(1_int64, 0_int64, step <= limits(3))
         end do
-        many = [tiny, short, middle]
+        ! The polynomial of the tiny steps is that of equal bodies.
+        many = [0, merge(int(tiny), 0, of%alike), int(short), int(middle), int(middle)]
+        if (middle < n) many(classes) = count(work%size(:n) <= limits(classes))
     end subroutine measure
 
-    !> Lanes of several classes: one class after another, while the other lanes stand still.
-    pure subroutine step_mixed(n, with_attitude, of, x1, x2, x3, work)
-        integer, intent(in) :: n
-        logical, intent(in) :: with_attitude
-        type(lane_bodies), intent(in) :: of
-        real(wp), intent(in) :: x1(n), x2(n), x3(n)
-        type(workspace), intent(inout) :: work
-        type(workspace) :: some
-        real(wp) :: m1(lanes), m2(lanes), m3(lanes)
-        logical :: mine(lanes)
-        integer :: class, l
-
-        work%d = 0.0_wp
-        work%w0 = 0.0_wp
-        work%w = 0.0_wp
-        do class = 1, classes
-            if (class == 1 .and. .not. of%alike) cycle
-            mine(:n) = work%reach(:n) <= limits(class)
-            if (class > merge(1, 2, of%alike)) mine(:n) = mine(:n) .and. work%reach(:n) > limits(class - 1)
-            if (.not. any(mine(:n))) cycle
-            m1(:n) = merge(x1, 0.0_wp, mine(:n))
-            m2(:n) = merge(x2, 0.0_wp, mine(:n))
-            m3(:n) = merge(x3, 0.0_wp, mine(:n))
-            some%p(:n) = merge(work%p(:n), 0.0_wp, mine(:n))
-            some%r(:n) = merge(work%r(:n), 0.0_wp, mine(:n))
-            some%reach(:n) = merge(work%reach(:n), 0.0_wp, mine(:n))
-            call step_class(class, n, with_attitude, of, m1, m2, m3, some)
-            do l = 1, n
-                if (.not. mine(l)) cycle
-                work%d(l, :) = some%d(l, :)
-                if (.not. with_attitude) cycle
-                work%w0(l) = some%w0(l)
-                work%w(l, :) = some%w(l, :)
-            end do
-        end do
-    end subroutine step_mixed
-
-    !> Whether step_lanes has advanced a lane.
-    elemental function is_served(reach) result(served)
-        real(wp), intent(in) :: reach
-        logical :: served
-
-        served = reach <= limits(classes)
-    end function is_served
-
-    !> Lanes of one class, p, r and reach known: their increments and turns.
-    pure subroutine step_class(class, n, with_attitude, of, x1, x2, x3, work)
+    !> The step of lanes of one class but the last, measured: increments and, with_attitude, turns.
+    pure subroutine step_lanes(class, n, with_attitude, of, x1, x2, x3, work)
         integer, intent(in) :: class, n
         logical, intent(in) :: with_attitude
         type(lane_bodies), intent(in) :: of
@@ -191,11 +126,11 @@ contains
                 call short_series(work%p(l) + work%r(l), work%p(l)*work%r(l), work%y(l), scd)
             end do
         case default
-            farthest = maxval(work%reach(:n))
+            farthest = maxval(work%size(:n))
             do l = 1, n
-                part = merge(0.25_wp, 0.125_wp, work%reach(l) <= 16*middle_limit)
-                part = merge(0.5_wp, part, work%reach(l) <= 4*middle_limit)
-                part = merge(1.0_wp, part, work%reach(l) <= middle_limit)
+                part = merge(0.25_wp, 0.125_wp, work%size(l) <= 16*middle_limit)
+                part = merge(0.5_wp, part, work%size(l) <= 4*middle_limit)
+                part = merge(1.0_wp, part, work%size(l) <= middle_limit)
                 work%part(l) = part
                 part = part*part
                 call middle_series((work%p(l) + work%r(l))*part, work%p(l)*work%r(l)*(part*part), &
@@ -216,25 +151,47 @@ contains
             if (with_attitude) call double_lane_angles(n, parts(i), of, work)
             call double_lanes(n, parts(i), work)
         end do
-        if (with_attitude) then
-            call move_and_keep(n, of, x1, x2, x3, work)
-            call turn_lanes(n, of, work)
-        else
-            call move(n, of, x1, x2, x3, work)
-        end if
-    end subroutine step_class
+        call move(n, of, x1, x2, x3, work)
+        if (with_attitude) call turn_lanes(n, of, work)
+    end subroutine step_lanes
 
-    !> Increments of the momentum. `keep`: also stores the numbers that the turn needs.
+    !> Increments of the momentum, and the numbers that the turn needs: without them the momentum alone
+    !> takes as long.
     pure subroutine move(n, of, x1, x2, x3, work)
-        logical, parameter :: keep = .false.
-        include 'lane_momentum.inc'
-    end subroutine move
+        integer, intent(in) :: n
+        type(lane_bodies), intent(in) :: of
+        real(wp), intent(in) :: x1(n), x2(n), x3(n)
+        type(workspace), intent(inout) :: work
+        real(wp) :: m1, m2, m3, y, cu, cw, cc, yc, scd, u, n1, n2, n3, d0, f
+        integer :: l
 
-    !> The same; what the attitude needs is kept.
-    pure subroutine move_and_keep(n, of, x1, x2, x3, work)
-        logical, parameter :: keep = .true.
-        include 'lane_momentum.inc'
-    end subroutine move_and_keep
+        do l = 1, n
+            m1 = x1(l)
+            m2 = x2(l)
+            m3 = x3(l)
+            y = work%y(l)
+            cu = 1 - work%p(l)*y
+            cw = 1 - work%r(l)*y
+            cc = cu*cw
+            yc = y*cc
+            scd = sqrt(yc)
+            u = yc*m3
+            n1 = m1*(scd*cw) - (of%a(l)*m2)*u
+            n2 = m2*(scd*cc) + (of%b(l)*m1)*u
+            n3 = m3*(scd*cu) - (of%g(l)*m1)*(yc*m2)
+            d0 = cc - (of%ag(l)*(m2*m2))*yc
+            f = (cc + cc)/(scd*(d0*d0 - of%ag(l)*(n2*n2)))
+            u = f*n3
+            work%d(l, 1) = -(of%a(l)*n2)*u
+            work%d(l, 2) = (of%b(l)*n1)*u
+            work%d(l, 3) = -(of%g(l)*n1)*(f*n2)
+            work%n1(l) = n1
+            work%n2(l) = n2
+            work%n3(l) = n3
+            work%d0(l) = d0
+            work%scd(l) = scd
+        end do
+    end subroutine move
 
     !> Of the two mirror forms the one with the smaller nu: with b = a + g, nu <= nu' is
     !> b g (m2^2 + m3^2) <= b a (m1^2 + m2^2).

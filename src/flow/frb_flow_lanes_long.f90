@@ -1,18 +1,17 @@
 !> The lanes of a block whose step is too long for frb_flow_lanes: the formulas of frb_flow_long in lanes, by
 !> doubling the triple, up to about ten periods. One body after another would take 2 to 3 times longer.
 module frb_flow_lanes_long
-    use frb_flow_lanes, only: lanes, lane_bodies, workspace, is_served
-    use frb_flow_limits, only: middle_limit, square_limit, period_limit, smallest_denominator
+    use frb_flow_lanes, only: lanes, lane_bodies, workspace
+    use frb_flow_limits, only: middle_limit, square_limit, smallest_denominator
     use frb_kinds, only: wp
     implicit none
     private
 
-    public :: step_long, is_near
+    public :: step_long
 
     !> The triple at a part of the time and its numbers of doublings; (ec, es) the angle of the third kind.
     type :: long_lanes
-        real(wp) :: mine(lanes)                                     !! 1, or 0 in lanes of other steps
-        real(wp) :: m1(lanes), m2(lanes), m3(lanes), gg(lanes)      !! 0 there
+        real(wp) :: m1(lanes), m2(lanes), m3(lanes), gg(lanes)
         real(wp) :: p(lanes), r(lanes), delta(lanes), part(lanes)   !! delta = (R - P) t^2
         real(wp) :: squares(lanes), triples(lanes)                  !! doublings of s^2 and then of the triple
         real(wp) :: y(lanes), s(lanes), c(lanes), d(lanes), z(lanes)
@@ -23,33 +22,21 @@ module frb_flow_lanes_long
 
 contains
 
-    !> Whether step_cyclic or step_long has advanced a lane.
-    elemental function is_near(reach) result(near)
-        real(wp), intent(in) :: reach
-        logical :: near
-
-        near = reach <= period_limit
-    end function is_near
-
-    !> As step_cyclic, for the lanes that step_cyclic has not moved; the results of the other lanes stay.
-    pure subroutine step_long(n, with_attitude, of, x1, x2, x3, work, all_near)
+    !> As step_lanes of frb_flow_lanes, for longer steps.
+    pure subroutine step_long(n, with_attitude, of, x1, x2, x3, work)
         integer, intent(in) :: n
         logical, intent(in) :: with_attitude
         type(lane_bodies), intent(in) :: of
         real(wp), intent(in) :: x1(n), x2(n), x3(n)
         type(workspace), intent(inout) :: work
-        logical, intent(out) :: all_near
         type(long_lanes) :: at
         integer :: i, most
 
-        all_near = all(is_near(work%reach(:n)))
-        at%mine(:n) = merge(1.0_wp, 0.0_wp, is_near(work%reach(:n)) .and. .not. is_served(work%reach(:n)))
-        if (.not. any(at%mine(:n) > 0)) return
-        at%m1(:n) = merge(x1, 0.0_wp, at%mine(:n) > 0)
-        at%m2(:n) = merge(x2, 0.0_wp, at%mine(:n) > 0)
-        at%m3(:n) = merge(x3, 0.0_wp, at%mine(:n) > 0)
-        at%p(:n) = merge(work%p(:n), 0.0_wp, at%mine(:n) > 0)
-        at%r(:n) = merge(work%r(:n), 0.0_wp, at%mine(:n) > 0)
+        at%m1(:n) = x1
+        at%m2(:n) = x2
+        at%m3(:n) = x3
+        at%p(:n) = work%p(:n)
+        at%r(:n) = work%r(:n)
         at%part(:n) = 1.0_wp
         call count_halvings(n, square_limit, at%p, at%r, at%part, at%triples)
         call count_halvings(n, middle_limit, at%p, at%r, at%part, at%squares)       ! nu <= max(p, r)
@@ -228,7 +215,7 @@ contains
         type(lane_bodies), intent(in) :: of
         type(long_lanes), intent(inout) :: at
         type(workspace), intent(inout) :: work
-        real(wp) :: c, d, d1, d2, d3
+        real(wp) :: c, d
         integer :: l
 
         do l = 1, n
@@ -238,10 +225,7 @@ contains
             at%d(l) = d
             call long_momentum(at%delta(l) <= 0, of%a(l), of%b(l), of%g(l), max(at%gg(l), tiny(1.0_wp)), &
                                at%s(l), c, d, at%z(l), at%m1(l), at%m2(l), at%m3(l), at%n1(l), at%n2(l), &
-                               at%n3(l), at%n0(l), d1, d2, d3)
-            work%d(l, 1) = merge(d1, work%d(l, 1), at%mine(l) > 0)
-            work%d(l, 2) = merge(d2, work%d(l, 2), at%mine(l) > 0)
-            work%d(l, 3) = merge(d3, work%d(l, 3), at%mine(l) > 0)
+                               at%n3(l), at%n0(l), work%d(l, 1), work%d(l, 2), work%d(l, 3))
         end do
     end subroutine move
 
@@ -268,10 +252,10 @@ contains
             call join_turns(form*cosine, along, first, at%m2(l), last, v0, v2, v3, w1, w2, w3)
             w0 = cosine*v0 - form*along*(at%m2(l)*v2 + last*v3)
             inverse = 1/sqrt(w0*w0 + (w1*w1 + (w2*w2 + w3*w3)))
-            work%w0(l) = merge(w0*inverse - 1, work%w0(l), at%mine(l) > 0)
-            work%w(l, 1) = merge(merge(w3, w1, form < 0)*inverse, work%w(l, 1), at%mine(l) > 0)
-            work%w(l, 2) = merge(w2*inverse, work%w(l, 2), at%mine(l) > 0)
-            work%w(l, 3) = merge(merge(w1, w3, form < 0)*inverse, work%w(l, 3), at%mine(l) > 0)
+            work%w0(l) = w0*inverse - 1
+            work%w(l, 1) = merge(w3, w1, form < 0)*inverse
+            work%w(l, 2) = w2*inverse
+            work%w(l, 3) = merge(w1, w3, form < 0)*inverse
         end do
     end subroutine turn_lanes
 

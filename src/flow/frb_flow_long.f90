@@ -23,7 +23,7 @@ contains
         real(wp) :: a, b, g, m1, m2, m3, gg, p, r, nu_first, nu_mirror, pmax, delta, nu, bg, over_norm
         real(wp) :: pmin, old_y, old_z, fraction, turned, whole, span, sine, cosine
         real(wp) :: s, y, z, c, d, ec, es, n1, n2, n3, n0, cp, dr, d1, d2, d3
-        logical :: with_attitude, cn_is_c, first_form, many_periods
+        logical :: with_attitude, cn_is_c, first_form
         integer :: i1, i2, i3, squares, triples
 
         with_attitude = present(q)
@@ -45,8 +45,7 @@ contains
         fraction = 1.0_wp
         whole = 0.0_wp
         turned = 1.0_wp
-        many_periods = pmax > period_limit
-        if (many_periods) call reduce_periods(pmax, delta, nu, with_attitude, fraction, turned, whole)
+        if (pmax > period_limit) call reduce_periods(pmax, delta, nu, with_attitude, fraction, turned, whole)
         ! Halvings to a part, the root of span, that the series reach: counted, so that NaN ends them too.
         span = fraction*fraction
         do triples = 0, most_halvings - 1
@@ -82,11 +81,9 @@ contains
             if (with_attitude) call double_angle(nu, bg, old_y, old_z, s, c*d, z, ec, es)
             if (z < smallest_denominator) call divide_by_sizes(s, c, d, z, ec, es)
         end do
-        if (many_periods) then
-            es = sign(1.0_wp, fraction)*es
-            s = sign(1.0_wp, fraction)*(turned*s)
-            c = turned*c
-        end if
+        es = sign(1.0_wp, fraction)*es
+        s = sign(1.0_wp, fraction)*(turned*s)
+        c = turned*c
         cp = merge(c, d, cn_is_c)
         dr = merge(d, c, cn_is_c)
         call long_momentum(cn_is_c, a, b, g, gg, s, cp, dr, z, m1, m2, m3, n1, n2, n3, n0, d1, d2, d3)

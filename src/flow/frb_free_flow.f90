@@ -311,11 +311,8 @@ contains
         real(wp), intent(in) :: h
         real(wp), intent(inout), contiguous :: m(:, :)      !! (3, n)
         integer, intent(out), optional :: stat
-        integer :: code
 
-        code = status_bad_count
-        if (size(m, 1) == 3) call flow_many([body%core], .true., [h], m, code)
-        call return_or_stop(code, 'free_flow', stat)
+        call flow_many([body%core], .true., [h], size(m, 2), m, stat)
     end subroutine flow_momenta
 
     !> Advances the momenta and attitudes of n equal bodies, in blocks that fill SIMD lanes. A body that is
@@ -326,13 +323,8 @@ contains
         real(wp), intent(inout), contiguous :: m(:, :)      !! (3, n)
         real(wp), intent(inout), contiguous :: q(:, :)      !! (4, n)
         integer, intent(out), optional :: stat
-        integer :: code
 
-        code = status_bad_count
-        if (size(m, 1) == 3 .and. size(q, 1) == 4 .and. size(m, 2) == size(q, 2)) then
-            call flow_many([body%core], .true., [h], m, code, q)
-        end if
-        call return_or_stop(code, 'free_flow', stat)
+        call flow_many([body%core], .true., [h], size(m, 2), m, stat, q)
     end subroutine flow_quaternions
 
     !> Advances the momenta of the n bodies body(:).
@@ -341,13 +333,8 @@ contains
         real(wp), intent(in) :: h
         real(wp), intent(inout), contiguous :: m(:, :)      !! (3, n)
         integer, intent(out), optional :: stat
-        integer :: code
 
-        code = status_bad_count
-        if (size(m, 1) == 3 .and. size(body) == size(m, 2)) then
-            call flow_many(cores_of(body), .false., [h], m, code)
-        end if
-        call return_or_stop(code, 'free_flow', stat)
+        call flow_many(cores_of(body), .false., [h], size(body), m, stat)
     end subroutine flow_momenta_of_bodies
 
     !> Advances the momenta and attitudes of the n bodies body(:).
@@ -357,14 +344,8 @@ contains
         real(wp), intent(inout), contiguous :: m(:, :)      !! (3, n)
         real(wp), intent(inout), contiguous :: q(:, :)      !! (4, n)
         integer, intent(out), optional :: stat
-        integer :: code
 
-        code = status_bad_count
-        if (size(m, 1) == 3 .and. size(q, 1) == 4 .and. size(m, 2) == size(q, 2) &
-            .and. size(body) == size(m, 2)) then
-            call flow_many(cores_of(body), .false., [h], m, code, q)
-        end if
-        call return_or_stop(code, 'free_flow', stat)
+        call flow_many(cores_of(body), .false., [h], size(body), m, stat, q)
     end subroutine flow_quaternions_of_bodies
 
 end module frb_free_flow

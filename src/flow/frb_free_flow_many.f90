@@ -44,7 +44,7 @@ contains
         real(wp), intent(inout), contiguous :: m(:, :)
         integer, intent(out), optional :: stat
 
-        call rows([core_of(body)], .true., h, size(h), m, stat)
+        call flow_many([core_of(body)], .true., h, size(h), m, stat)
     end subroutine momenta_of_body_at_times
 
     !> The momenta of the n bodies body(n), by the times h(n).
@@ -54,7 +54,7 @@ contains
         real(wp), intent(inout), contiguous :: m(:, :)
         integer, intent(out), optional :: stat
 
-        call rows(cores_of(body), .false., h, count_of(body, h), m, stat)
+        call flow_many(cores_of(body), .false., h, count_of(body, h), m, stat)
     end subroutine momenta_of_bodies_at_times
 
     !> The momenta and quaternions of n equal bodies, by the times h(n).
@@ -64,7 +64,7 @@ contains
         real(wp), intent(inout), contiguous :: m(:, :), q(:, :)
         integer, intent(out), optional :: stat
 
-        call rows([core_of(body)], .true., h, size(h), m, stat, q)
+        call flow_many([core_of(body)], .true., h, size(h), m, stat, q)
     end subroutine quaternions_of_body_at_times
 
     !> The momenta and quaternions of the n bodies body(n), by the times h(n).
@@ -74,7 +74,7 @@ contains
         real(wp), intent(inout), contiguous :: m(:, :), q(:, :)
         integer, intent(out), optional :: stat
 
-        call rows(cores_of(body), .false., h, count_of(body, h), m, stat, q)
+        call flow_many(cores_of(body), .false., h, count_of(body, h), m, stat, q)
     end subroutine quaternions_of_bodies_at_times
 
     !> The momenta and matrices of n equal bodies, by h.
@@ -121,67 +121,53 @@ contains
     subroutine columns_of_body_at_time(body, h, m1, m2, m3, q0, q1, q2, q3, stat)
         type(rigid_body), intent(in) :: body
         real(wp), intent(in) :: h
-        real(wp), intent(inout), contiguous :: m1(:), m2(:), m3(:)
+        real(wp), intent(inout) :: m1(:), m2(:), m3(:)
         real(wp), intent(inout), optional :: q0(:), q1(:), q2(:), q3(:)
         integer, intent(out), optional :: stat
+        integer :: code
 
-        call columns([core_of(body)], .true., [h], size(m1), m1, m2, m3, stat, q0, q1, q2, q3)
+        call flow_columns([core_of(body)], .true., [h], size(m1), m1, m2, m3, code, q0, q1, q2, q3)
+        call return_or_stop(code, 'free_flow_columns', stat)
     end subroutine columns_of_body_at_time
 
     !> The columns of n equal bodies, by the times h(n).
     subroutine columns_of_body_at_times(body, h, m1, m2, m3, q0, q1, q2, q3, stat)
         type(rigid_body), intent(in) :: body
         real(wp), intent(in) :: h(:)
-        real(wp), intent(inout), contiguous :: m1(:), m2(:), m3(:)
+        real(wp), intent(inout) :: m1(:), m2(:), m3(:)
         real(wp), intent(inout), optional :: q0(:), q1(:), q2(:), q3(:)
         integer, intent(out), optional :: stat
+        integer :: code
 
-        call columns([core_of(body)], .true., h, size(h), m1, m2, m3, stat, q0, q1, q2, q3)
+        call flow_columns([core_of(body)], .true., h, size(h), m1, m2, m3, code, q0, q1, q2, q3)
+        call return_or_stop(code, 'free_flow_columns', stat)
     end subroutine columns_of_body_at_times
 
     !> The columns of the n bodies body(n), by h.
     subroutine columns_of_bodies_at_time(body, h, m1, m2, m3, q0, q1, q2, q3, stat)
         type(rigid_body), intent(in), target :: body(:)
         real(wp), intent(in) :: h
-        real(wp), intent(inout), contiguous :: m1(:), m2(:), m3(:)
+        real(wp), intent(inout) :: m1(:), m2(:), m3(:)
         real(wp), intent(inout), optional :: q0(:), q1(:), q2(:), q3(:)
         integer, intent(out), optional :: stat
+        integer :: code
 
-        call columns(cores_of(body), .false., [h], size(body), m1, m2, m3, stat, q0, q1, q2, q3)
+        call flow_columns(cores_of(body), .false., [h], size(body), m1, m2, m3, code, q0, q1, q2, q3)
+        call return_or_stop(code, 'free_flow_columns', stat)
     end subroutine columns_of_bodies_at_time
 
     !> The columns of the n bodies body(n), by the times h(n).
     subroutine columns_of_bodies_at_times(body, h, m1, m2, m3, q0, q1, q2, q3, stat)
         type(rigid_body), intent(in), target :: body(:)
         real(wp), intent(in) :: h(:)
-        real(wp), intent(inout), contiguous :: m1(:), m2(:), m3(:)
+        real(wp), intent(inout) :: m1(:), m2(:), m3(:)
         real(wp), intent(inout), optional :: q0(:), q1(:), q2(:), q3(:)
         integer, intent(out), optional :: stat
-
-        call columns(cores_of(body), .false., h, count_of(body, h), m1, m2, m3, stat, q0, q1, q2, q3)
-    end subroutine columns_of_bodies_at_times
-
-    !> n states in rows of m, and of q when present.
-    subroutine rows(core, alike, h, n, m, stat, q)
-        type(body_core), intent(in) :: core(:)
-        logical, intent(in) :: alike            !! core(1) is meant for all, whatever n
-        real(wp), intent(in), contiguous :: h(:)
-        integer, intent(in) :: n
-        real(wp), intent(inout), contiguous :: m(:, :)
-        integer, intent(out), optional :: stat
-        real(wp), intent(inout), contiguous, optional :: q(:, :)
         integer :: code
 
-        code = status_bad_count
-        if (match(core, h, n) .and. size(m, 1) == 3 .and. size(m, 2) == n) then
-            if (.not. present(q)) then
-                call flow_many(core, alike, h, m, code)
-            else if (size(q, 1) == 4 .and. size(q, 2) == n) then
-                call flow_many(core, alike, h, m, code, q)
-            end if
-        end if
-        call return_or_stop(code, 'free_flow', stat)
-    end subroutine rows
+        call flow_columns(cores_of(body), .false., h, count_of(body, h), m1, m2, m3, code, q0, q1, q2, q3)
+        call return_or_stop(code, 'free_flow_columns', stat)
+    end subroutine columns_of_bodies_at_times
 
     !> n states with matrices: the turns of a chunk as quaternions, then the matrices by them. A matrix that
     !> is not finite is refused as a quaternion of norm zero is.
@@ -193,13 +179,14 @@ contains
         real(wp), intent(inout), contiguous :: m(:, :), a(:, :, :)
         integer, intent(out), optional :: stat
         real(wp) :: q(4, chunk)
-        integer :: code, one, first, last, count, b, t, i
+        integer :: code, refused, first, last, count, b, t, i
 
         code = status_bad_count
-        if (match(core, h, n) .and. size(m, 1) == 3 .and. size(m, 2) == n .and. size(a, 1) == 3 &
-            .and. size(a, 2) == 3 .and. size(a, 3) == n) then
+        if (any(size(core) == [1, n]) .and. any(size(h) == [1, n]) .and. all(shape(m) == [3, n]) &
+            .and. all(shape(a) == [3, 3, n])) then
             code = status_ok
-            !$omp parallel do if (n >= 64*chunk) private(q, last, count, b, t, i, one) reduction(max: code)
+            !$omp parallel do if (n >= 64*chunk) private(q, last, count, b, t, i, refused) &
+            !$omp& reduction(max: code)
             do first = 1, n, chunk
                 count = min(chunk, n - first + 1)
                 last = first + count - 1
@@ -210,10 +197,10 @@ contains
                     if (all(ieee_is_finite(a(:, :, first + i - 1)))) q(1, i) = 1.0_wp
                 end do
                 associate (c => merge(first, 1, b > 1), s => merge(first, 1, t > 1))
-                    call flow_many(core(c:c + b - 1), alike, h(s:s + t - 1), m(:, first:last), one, &
-                                   q(:, :count))
+                    call flow_many(core(c:c + b - 1), alike, h(s:s + t - 1), count, m(:, first:last), &
+                                   refused, q(:, :count))
                 end associate
-                code = max(code, one)
+                code = max(code, refused)
                 do i = 1, count
                     if (any(abs(q(2:4, i)) > 0.0_wp)) call turn_matrix(q(:, i), a(:, :, first + i - 1))
                 end do
@@ -223,32 +210,7 @@ contains
         call return_or_stop(code, 'free_flow', stat)
     end subroutine matrices
 
-    !> n states in columns. The q are nowhere `contiguous`: GCC reads the address of such an argument, absent
-    !> or not, where it is passed on.
-    subroutine columns(core, alike, h, n, m1, m2, m3, stat, q0, q1, q2, q3)
-        type(body_core), intent(in) :: core(:)
-        logical, intent(in) :: alike            !! core(1) is meant for all, whatever n
-        real(wp), intent(in), contiguous :: h(:)
-        integer, intent(in) :: n
-        real(wp), intent(inout), contiguous :: m1(:), m2(:), m3(:)
-        integer, intent(out), optional :: stat
-        real(wp), intent(inout), optional :: q0(:), q1(:), q2(:), q3(:)
-        integer :: code
-
-        code = status_bad_count
-        if (match(core, h, n) .and. all([size(m1), size(m2), size(m3)] == n)) then
-            if (present(q0) .and. present(q1) .and. present(q2) .and. present(q3)) then
-                if (all([size(q0), size(q1), size(q2), size(q3)] == n)) then
-                    call flow_columns(core, alike, h, m1, m2, m3, code, q0, q1, q2, q3)
-                end if
-            else if (.not. (present(q0) .or. present(q1) .or. present(q2) .or. present(q3))) then
-                call flow_columns(core, alike, h, m1, m2, m3, code)
-            end if
-        end if
-        call return_or_stop(code, 'free_flow_columns', stat)
-    end subroutine columns
-
-    !> The number of bodies that have a time each; -1, which `match` refuses, if there are not as many times.
+    !> The number of bodies that have a time each; -1, which is refused, if there are not as many times.
     pure function count_of(body, h) result(n)
         type(rigid_body), intent(in) :: body(:)
         real(wp), intent(in) :: h(:)
@@ -256,15 +218,5 @@ contains
 
         n = merge(size(body), -1, size(body) == size(h))
     end function count_of
-
-    !> Whether there is one body or n, and one time or n.
-    pure function match(core, h, n) result(yes)
-        type(body_core), intent(in) :: core(:)
-        real(wp), intent(in) :: h(:)
-        integer, intent(in) :: n
-        logical :: yes
-
-        yes = (size(core) == 1 .or. size(core) == n) .and. (size(h) == 1 .or. size(h) == n)
-    end function match
 
 end module frb_free_flow_many

@@ -197,7 +197,7 @@ contains
         real(wp), intent(out) :: m(:, :)
         real(wp), intent(out), optional :: q(:, :)
         integer, intent(out), optional :: stat
-        integer :: code, one, i
+        integer :: code, code_here, i
 
         code = self%status
         if (size(m, 1) /= 3 .or. size(m, 2) /= size(t)) code = status_bad_count
@@ -214,11 +214,11 @@ contains
         else
             do i = 1, size(t)
                 if (present(q)) then
-                    call self%at_time(t(i), m(:, i), q(:, i), one)
+                    call self%at_time(t(i), m(:, i), q(:, i), code_here)
                 else
-                    call self%at_time(t(i), m(:, i), stat=one)
+                    call self%at_time(t(i), m(:, i), stat=code_here)
                 end if
-                code = max(code, one)
+                code = max(code, code_here)
             end do
         end if
         call return_or_stop(code, 'free_motion%at', stat)

@@ -264,7 +264,7 @@ contains
                 if (code /= status_ok) return
             end do
         else
-            call flow_many(run%core, size(run%core) == 1, [h], m, code, q)
+            call flow_many(run%core, size(run%core) == 1, [h], size(m, 2), m, code, q)
         end if
     end subroutine advance_all
 
