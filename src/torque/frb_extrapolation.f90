@@ -209,7 +209,7 @@ contains
         type(extrapolation_report), intent(inout) :: told
         integer, intent(out) :: code
         class(body_observer), intent(inout), optional :: observer
-        real(wp) :: start, left, left_before, h, least, guess, ratio, before, reach, few
+        real(wp) :: start, left, left_before, h, least, guess, ratio, before, longest, few_terms
         integer :: short_steps
         logical :: accepted, last
 
@@ -219,8 +219,8 @@ contains
         guess = 0.0_wp
         h = 0.0_wp
         before = 0.0_wp
-        few = few_terms_angle(moved%set, told%tolerance)
-        if (fixed > 0.0_wp) few = 0.0_wp
+        few_terms = few_terms_angle(moved%set, told%tolerance)
+        if (fixed > 0.0_wp) few_terms = 0.0_wp
         short_steps = 0
         if (present(observer)) call show(moved, scene, 0_int64, t_now, observer, code)
         do while (code == status_ok .and. abs(left) > 0.0_wp)
@@ -231,16 +231,16 @@ contains
                 h = guess
             end if
             least = 4*epsilon(h)*max(abs(t_now), abs(left), tiny(h)/epsilon(h))
-            reach = series_reach(moved)
+            longest = series_reach(moved)
             if (fixed > 0.0_wp) then
                 h = abs(left)/max(1_int64, ceiling(abs(left)/fixed*(1 - 8*epsilon(h)), int64))
             else
-                h = max(least, within_reach(reach, without_sliver(h, abs(left))))
+                h = max(least, within_reach(longest, without_sliver(h, abs(left))))
             end if
             last = h >= abs(left)
             if (last) h = abs(left)
-            call try_step(moved, scene, t_now, sign(h, time), h > 1.01_wp*reach, &
-                          h*moved%core%beta*norm3(moved%x(1:3)) < few, told%torques, code)
+            call try_step(moved, scene, t_now, sign(h, time), h > 1.01_wp*longest, &
+                          h*moved%core%beta*norm3(moved%x(1:3)) < few_terms, told%torques, code)
             call agree_on_step(moved, scene, code)
             if (code /= status_ok) exit
             ! Only NaN can cause rejected steps without end.
@@ -262,7 +262,7 @@ contains
             t_now = merge(start + time, start + (time - left), last)
             call note_step(told, h, moved%error, last)
             ! The guess has no meaning if there was no torque at the start.
-            short_steps = merge(short_steps + 1, 0, h < 1.0e-6_wp*min(guess, reach) &
+            short_steps = merge(short_steps + 1, 0, h < 1.0e-6_wp*min(guess, longest) &
                                 .and. .not. fixed > 0.0_wp)
             if (code == status_ok .and. short_steps > 10000) code = status_too_rough
             if (code == status_ok .and. present(observer)) then

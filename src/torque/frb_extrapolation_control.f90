@@ -71,7 +71,7 @@ contains
         type(extrapolated_body), intent(in) :: moved
         real(wp), intent(in) :: torque(3), tolerance
         real(wp) :: h
-        real(wp), parameter :: constants(*) = [1.0e-14_wp, 2.0e-15_wp, 2.0e-10_wp]
+        real(wp), parameter :: constants(*) = [3.0e-15_wp, 2.0e-15_wp, 2.0e-10_wp]
         real(wp), parameter :: least = 1.0e-100_wp
         real(wp) :: acceleration, rate, ratio
 

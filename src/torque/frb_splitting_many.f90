@@ -181,12 +181,12 @@ contains
             call run%scene%torques(run%q_turned, time, run%other, code)
         else if (run%basis%displaced == 2) then
             ! Both calls are made, whatever the first code is: other processes may take part in the torques.
-            call turn_all(run, run%basis%reach)
+            call turn_all(run, run%basis%displacement)
             call run%scene%torques(run%q_turned, time, run%g, code)
-            call turn_all(run, -run%basis%reach)
+            call turn_all(run, -run%basis%displacement)
             call run%scene%torques(run%q_turned, time, run%other, refused)
             if (code == status_ok) code = refused
-            if (code == status_ok) run%g(:, :) = (run%g - run%other)/(2*run%basis%reach)
+            if (code == status_ok) run%g(:, :) = (run%g - run%other)/(2*run%basis%displacement)
         end if
         if (code == status_ok) call finish_gradient(run, code)
         call run%scene%agree(code)
@@ -211,14 +211,14 @@ contains
                    .and. all_within(size(run%g), run%g, run%basis%largest_gradient))) code = status_bad_torque
     end subroutine finish_gradient
 
-    !> The attitudes turned by `reach` times n.
-    pure subroutine turn_all(run, reach)
+    !> The attitudes turned by `amount` times n.
+    pure subroutine turn_all(run, amount)
         type(moving), intent(inout) :: run
-        real(wp), intent(in) :: reach
+        real(wp), intent(in) :: amount
         integer :: i
 
         do i = 1, size(run%q, 2)
-            run%q_turned(:, i) = turned(run%q(:, i), reach*run%n(:, i))
+            run%q_turned(:, i) = turned(run%q(:, i), amount*run%n(:, i))
         end do
     end subroutine turn_all
 

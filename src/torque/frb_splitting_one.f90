@@ -163,10 +163,10 @@ contains
             run%tau = change + cross(turn, run%tau)
             run%g = 0.0_wp
         else
-            call run%scene%torque(turned(run%q, run%basis%reach*turn), time, change, code)
-            call run%scene%torque(turned(run%q, -run%basis%reach*turn), time, other, refused)
+            call run%scene%torque(turned(run%q, run%basis%displacement*turn), time, change, code)
+            call run%scene%torque(turned(run%q, -run%basis%displacement*turn), time, other, refused)
             if (code == status_ok) code = refused
-            run%g = gradient_torque(turn, run%tau, (change - other)/(2*run%basis%reach))
+            run%g = gradient_torque(turn, run%tau, (change - other)/(2*run%basis%displacement))
         end if
         call check_torque_and_gradient(run, code)
     end subroutine ask_torque_and_gradient

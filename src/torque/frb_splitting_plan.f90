@@ -51,7 +51,7 @@ module frb_splitting_plan
         logical :: torque_known = .false.       !! no attitude has changed since the last torque
         real(wp) :: largest_torque = 0.0_wp     !! of a torque whose kicks do not overflow
         real(wp) :: largest_gradient = 0.0_wp   !! the same of g, see frb_modified_kicks
-        real(wp) :: reach = 0.0_wp              !! displaced torques: turn by this times n
+        real(wp) :: displacement = 0.0_wp       !! displaced torques: turn by this times n
         integer :: displaced = 0                !! number of displaced torques; 0: the scene has the change
         integer :: on_request = 2               !! number of displaced torques if the scene has no change
     end type run_basis
@@ -133,7 +133,7 @@ contains
         if (present(joined)) basis%joined = joined
         basis%largest_torque = largest/max(1.0_wp, maxval(abs(plan%kick)))
         basis%largest_gradient = largest/max(1.0_wp, maxval(abs(plan%modified)))
-        if (scheme%has_modified_kicks()) basis%reach = 0.25_wp*h*h
+        if (scheme%has_modified_kicks()) basis%displacement = 0.25_wp*h*h
         basis%on_request = scheme%displaced
     end function new_basis
 
