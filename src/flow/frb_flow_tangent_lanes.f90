@@ -48,12 +48,18 @@ contains
         type(lane_orbits), intent(inout) :: it
         integer, intent(out) :: nears, fars         !! number of lanes of these kinds
         real(wp) :: n1, n2, n3, size_m, size_q, least, most, ab, ag, bg, k, p, r, reach, square, kind
+        real(wp) :: most_near       !! largest square of a half angle of the series
         integer(int64) :: series, doublings
         integer :: l
 
         ab = body%a*body%b
         ag = body%a*body%g
         bg = body%b*body%g
+        ! By |m| alone, p and r being at most |m|^2 times the larger of bg and ab: so bodies with momenta of
+        ! one size are of one kind, and their blocks need only one.
+        most_near = small_turn_limit
+        k = max(ab, bg)
+        if (small_turn_limit*k > short_limit*body%largest) most_near = short_limit*body%largest/k
         series = 0
         doublings = 0
         do l = 1, lanes
@@ -78,7 +84,7 @@ contains
             reach = max(p, r)
             kind = merge(far, no_lane, reach <= period_limit)
             kind = merge(kind, no_lane, square <= sin_cos_limit**2)
-            kind = merge(near, kind, max(reach, square*(short_limit/small_turn_limit)) <= short_limit)
+            kind = merge(near, kind, square <= most_near)
             kind = merge(kind, no_lane, least > plain_smallest)
             it%kind(l) = kind
             it%m1(l) = n1
