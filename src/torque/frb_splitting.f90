@@ -62,7 +62,7 @@ module frb_splitting
     !> shown: then the bits depend on which states are shown. It pays where torques are cheap.
     !>
     !> `compensated` carries the rounding error of every update of m and q over to the next one, and keeps |m|
-    !> and the energy in every drift. It takes twice the time and pays in long runs: there energy,
+    !> and the energy in every drift. It takes 2.2 to 2.3 times as long and pays in long runs: there energy,
     !> momentum and norm stay within a few units of the last digit, where errors of a plain run grow with the
     !> square root of the number of steps.
     !>
