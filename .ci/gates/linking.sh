@@ -120,7 +120,10 @@ tests_by_flang() {
     library_and_tests_alone
     local flags="-O0" brief=--brief
     if [ "${FRB_CI_FULL:-}" = 1 ]; then flags=-O2 brief=; fi
-    "$fpm" test --compiler flang-new-22 --flag "$flags" -- $brief 2>&1 | tee log
+    local code=0
+    "$fpm" test --compiler flang-new-22 --flag "$flags" -- $brief >log 2>&1 || code=$?
+    cat log
+    [ $code = 0 ]
     if grep -i 'warning:' log; then return 1; fi
     grep -E '^[0-9]+ skipped$' log
 }
