@@ -8,6 +8,7 @@ module frb_flow_limits
     public :: most_halvings
     public :: short_limit, tiny_limit, tiny_turn_limit, small_turn_limit, middle_limit, middle_turn_limit
     public :: square_limit, period_limit, smallest_denominator, sin_cos_limit, plain_largest, plain_smallest
+    public :: separatrix, settled
     public :: tiny_step, short_step, middle_step, beyond_series
 
     !> The series that a step of one body uses.
@@ -22,6 +23,8 @@ module frb_flow_limits
     real(wp), parameter :: middle_turn_limit = 0.6_wp   !! largest square of a half angle of the middle series
     real(wp), parameter :: square_limit = 0.8_wp        !! largest max(P, R) t^2 to which s^2 alone is doubled
     real(wp), parameter :: period_limit = 1024.0_wp     !! max(P, R) (h/2)^2 from which periods are taken out
+    real(wp), parameter :: separatrix = 1.0e-200_wp     !! |R - P|/max(P, R) that counts as 0
+    real(wp), parameter :: settled = 60.0_wp            !! half step times lambda that ends there on the axis
     real(wp), parameter :: smallest_denominator = 1.0e-9_wp    !! of the triple, before a division
     real(wp), parameter :: sin_cos_limit = 1.5e6_wp     !! largest argument of sin_cos
     real(wp), parameter :: plain_largest = 1.0e75_wp    !! components whose squares and products are safe

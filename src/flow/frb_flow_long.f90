@@ -3,7 +3,7 @@
 !> is the same to the bit: a long step next to the separatrix makes much of one rounding.
 module frb_flow_long
     use frb_flow_limits, only: most_halvings, middle_limit, square_limit, period_limit, &
-        smallest_denominator, sin_cos_limit
+        smallest_denominator, sin_cos_limit, separatrix, settled
     use frb_inertia, only: body_core
     use frb_kinds, only: wp, pi
     implicit none
@@ -27,12 +27,7 @@ contains
         integer :: i1, i2, i3, squares, triples
 
         with_attitude = present(q)
-        i1 = body%order(1)
-        i2 = body%order(2)
-        i3 = body%order(3)
-        m1 = m(i1)
-        m2 = m(i2)
-        m3 = body%parity*m(i3)
+        call sort_momentum(body, m, i1, i2, i3, m1, m2, m3)
         call orbit_constants(body%alpha, body%beta, body%gamma, t, m1, m2, m3, a, b, g, gg, p, r, nu_first, &
                              nu_mirror)
         delta = orbit_difference(a, b, g, m1, m3)
@@ -116,12 +111,7 @@ contains
         bg = b*norm
         angle = norm*(merge(body%a(1), body%a(3), first_form)*t)
         angle = angle - merge(1.0_wp, -1.0_wp, first_form)*bg*(nu*whole)
-        if (abs(angle) <= sin_cos_limit) then
-            call sin_cos(angle, sine, cosine)
-        else
-            sine = sin(angle)
-            cosine = cos(angle)
-        end if
+        call any_sin_cos(angle, sine, cosine)
         call base_angle(bg*(nu*y)*s*middle_third_kind(p*y, r*y, nu*y), ec, es)
     end subroutine angles
 
@@ -184,19 +174,14 @@ contains
         q3 = inverse*p3
     end subroutine turn_far
 
-    !> Removes whole half periods 2 T4 from the time 1: `fraction` remains, |fraction| <= T4. An odd number of
-    !> half periods changes the sign of s and of the cn-like function, `turned` = -1; `whole` is the integral
-    !> of the third kind over them. On the separatrix (delta < 1e-200 pmax) there are no periods: after 60
-    !> units of 1/lambda the motion has reached the middle axis to all digits, and then turns uniformly.
+    !> Whole periods: see remove_periods; `whole` is the integral of the third kind over them. On the
+    !> separatrix (delta <= 1e-200 pmax) there are no periods: after 60 units of 1/lambda the motion has
+    !> reached the middle axis to all digits, and then turns uniformly.
     pure subroutine reduce_periods(pmax, delta, nu, with_whole, fraction, turned, whole)
         real(wp), intent(in) :: pmax, delta, nu
         logical, intent(in) :: with_whole       !! .false.: `whole` is not wanted and comes back 0
         real(wp), intent(out) :: fraction, turned, whole
-        real(wp), parameter :: most_exact = 2.0_wp**26
-        real(wp), parameter :: separatrix = 1.0e-200_wp
-        real(wp), parameter :: settled = 60.0_wp
-        real(wp), parameter :: round_up = 6755399441055744.0_wp    ! 3 * 2^51: adding it rounds to an integer
-        real(wp) :: period, mean, half, number, high
+        real(wp) :: period, mean
 
         turned = 1.0_wp
         if (delta <= separatrix*pmax) then
@@ -205,28 +190,15 @@ contains
             return
         end if
         call quarter_period(pmax, delta, nu, with_whole, period, mean)
-        half = 2*period
-        number = 1/half
-        if (number <= most_exact) then
-            number = (number + round_up) - round_up
-            ! Split half into 27 and 26 bits: number*high is exact, and so is the subtraction that cancels.
-            high = half*134217729.0_wp
-            high = high - (high - half)
-            fraction = (1 - number*high) - number*(half - high)
-        else
-            fraction = mod(1.0_wp, half)
-            number = (1 - fraction)/half
-            if (fraction > period) then
-                fraction = fraction - half
-                number = number + 1
-            end if
-            number = mod(number, 2.0_wp)
-        end if
-        turned = 1 - 2*abs(number - 2*((0.5_wp*number + round_up) - round_up))
+        call remove_periods(period, fraction, turned)
         whole = (1 - fraction)*mean
     end subroutine reduce_periods
 
+    include 'sorted_momentum.inc'
+
     include 'period_formulas.inc'
+
+    include 'whole_periods.inc'
 
     include 'all_doublings.inc'
 

@@ -91,26 +91,6 @@ contains
         end if
     end subroutine tangent_body
 
-    !> `status_ok`, or why the numbers are refused.
-    pure function refusal(h, m, q) result(code)
-        real(wp), intent(in) :: h, m(3)
-        real(wp), intent(in), optional :: q(4)
-        integer :: code
-
-        code = status_ok
-        if (.not. all(ieee_is_finite(m))) then
-            code = status_bad_momentum
-        else if (.not. ieee_is_finite(h)) then
-            code = status_bad_time
-        else if (present(q)) then
-            if (.not. all(ieee_is_finite(q))) then
-                code = status_bad_attitude
-            else if (maxval(abs(q)) <= 0.0_wp) then
-                code = status_bad_attitude
-            end if
-        end if
-    end function refusal
-
     !> The derivatives of the identity.
     pure subroutine no_step(elements, q, transition, jacobian, by_inertia)
         integer, intent(in) :: elements
@@ -301,11 +281,7 @@ contains
         em = exponent(maxval(abs(m)))
         ea = exponent(body%a(1))
         time = set_exponent(h, min(exponent(h) + em + ea, cut))
-        scaled = body
-        scaled%a = scale(body%a, -ea)
-        scaled%alpha = scale(body%alpha, -ea)
-        scaled%beta = scale(body%beta, -ea)
-        scaled%gamma = scale(body%gamma, -ea)
+        scaled = scaled_body(body, ea)
         m = scale(m, -em)
         eq = 0
         if (present(q)) then
@@ -324,5 +300,7 @@ contains
     end subroutine tangent_rescaled
 
     include 'plain_numbers.inc'
+
+    include 'extreme_numbers.inc'
 
 end module frb_flow_tangent_body

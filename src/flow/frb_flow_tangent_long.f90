@@ -2,7 +2,8 @@
 !> frb_flow_long with two integrals more, D and the one over dn^2; many periods by one arithmetic-geometric
 !> mean.
 module frb_flow_tangent_long
-    use frb_flow_limits, only: most_halvings, middle_limit, square_limit, period_limit, sin_cos_limit
+    use frb_flow_limits, only: most_halvings, middle_limit, square_limit, period_limit, sin_cos_limit, &
+        separatrix, settled
     use frb_flow_tangent_parts, only: step_parts
     use frb_flow_tangent_periods, only: reduce_periods
     use frb_inertia, only: body_core
@@ -11,9 +12,6 @@ module frb_flow_tangent_long
     private
 
     public :: long_tangent
-
-    real(wp), parameter :: separatrix = 1.0e-200_wp     !! |R - P|/max(P, R) that counts as 0
-    real(wp), parameter :: settled = 60.0_wp            !! half step that ends on the axis, times lambda
 
     !> The state of the doublings. z: common denominator of the triple, by which no doubling divides.
     type :: doubling_state
@@ -176,12 +174,7 @@ contains
         real(wp) :: angle
 
         angle = sqrt(f%gg)*f%rate - it%bg*(f%nu*it%whole_third)
-        if (abs(angle) <= sin_cos_limit) then
-            call sin_cos(angle, sine, cosine)
-        else
-            sine = sin(angle)
-            cosine = cos(angle)
-        end if
+        call any_sin_cos(angle, sine, cosine)
     end subroutine uniform_turn
 
     !> All doublings, then the integrals over whole periods: triple in f, integrals in `it`.
@@ -249,12 +242,7 @@ contains
 
         call long_momentum(f%c_is_cn, f%a, f%b, f%g, f%gg, f%s, f%c, f%d, 1.0_wp, f%m1, f%m2, f%m3, f%n1, &
                            f%n2, f%n3, n0, d1, d2, d3)
-        f%e1 = f%m1 + d1
-        f%e2 = f%m2 + d2
-        f%e3 = f%m3 + d3
-        m(f%o1) = f%s1*f%e1
-        m(f%o2) = f%e2
-        m(f%o3) = f%s3*f%e3
+        call end_momentum(d1, d2, d3, f, m)
         over = 1/n0
         f%n1 = f%n1*over
         f%n2 = f%n2*over

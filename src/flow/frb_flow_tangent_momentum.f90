@@ -23,12 +23,7 @@ contains
         real(wp) :: j11, j12, j13, j21, j22, j23, j31, j32, j33
         integer :: i1, i2, i3
 
-        i1 = body%order(1)
-        i2 = body%order(2)
-        i3 = body%order(3)
-        m1 = m(i1)
-        m2 = m(i2)
-        m3 = body%parity*m(i3)      ! sorted axes are right-handed: see short_formulas.inc
+        call sort_momentum(body, m, i1, i2, i3, m1, m2, m3)
         a = body%alpha*t
         b = body%beta*t
         g = body%gamma*t
@@ -71,6 +66,8 @@ contains
         jacobian(i3, i2) = body%parity*j32
         jacobian(i3, i3) = 1 + j33
     end subroutine short_jacobian
+
+    include 'sorted_momentum.inc'
 
     include 'series_formulas.inc'
 

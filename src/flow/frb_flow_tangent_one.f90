@@ -139,12 +139,7 @@ contains
 
         call short_momentum(f%p*f%y, f%r*f%y, f%a*f%g*(f%m2*f%m2)*(f%scd*f%scd), f%scd, f%m1, f%m2, f%m3, &
                             f%a*(f%m2*f%m3), f%b*(f%m3*f%m1), f%g*(f%m1*f%m2), d1, d2, d3)
-        f%e1 = f%m1 + d1
-        f%e2 = f%m2 + d2
-        f%e3 = f%m3 + d3
-        m(f%o1) = f%s1*f%e1
-        m(f%o2) = f%e2
-        m(f%o3) = f%s3*f%e3
+        call end_momentum(d1, d2, d3, f, m)
     end subroutine advance_momentum
 
     !> q at the end of the step, E, and 2/(1 + x^2 + v^2).
@@ -173,14 +168,7 @@ contains
                              f%g*(f%m1*f%m2), v0, v2, v3)
         call join_turns(f%cosine, f%along, f%m1, f%m2, f%m3, 1 + v0, v2, v3, w1, w2, w3)
         square = (v0*(2 + v0) + v2*v2) + v3*v3
-        select case (reach)
-        case (tiny_step)
-            change = tiny_norm(square)
-        case (short_step)
-            change = short_norm(square)
-        case default
-            change = middle_norm(square)
-        end select
+        change = change_of_norm(reach, square)
         z0 = (1 + v0)*(1 + change)
         twice = 2*(z0*z0)
         call small_unit_turn(cosm1, v0, f%along*(f%m2*v2 + f%m3*v3), change, w0, w1, w2, w3)

@@ -15,29 +15,10 @@ contains
         real(wp), intent(in) :: pmax, delta, nu
         logical, intent(in) :: with_third       !! .false.: whole_third is not wanted, and means nothing
         real(wp), intent(out) :: fraction, turned, whole_third, whole_dd, whole_own
-        real(wp), parameter :: most_exact = 2.0_wp**26
-        real(wp), parameter :: round_up = 6755399441055744.0_wp    ! 3 * 2^51: adding it rounds to an integer
-        real(wp) :: period, mean_third, mean_dd, mean_own, half, number, high
+        real(wp) :: period, mean_third, mean_dd, mean_own
 
         call quarter_means(pmax, delta, nu, with_third, period, mean_third, mean_dd, mean_own)
-        half = 2*period
-        number = 1/half
-        if (number <= most_exact) then
-            number = (number + round_up) - round_up
-            ! Split half into 27 and 26 bits: number*high is exact, and so is the subtraction that cancels.
-            high = half*134217729.0_wp
-            high = high - (high - half)
-            fraction = (1 - number*high) - number*(half - high)
-        else
-            fraction = mod(1.0_wp, half)
-            number = (1 - fraction)/half
-            if (fraction > period) then
-                fraction = fraction - half
-                number = number + 1
-            end if
-            number = mod(number, 2.0_wp)
-        end if
-        turned = 1 - 2*abs(number - 2*((0.5_wp*number + round_up) - round_up))
+        call remove_periods(period, fraction, turned)
         whole_third = (1 - fraction)*mean_third
         whole_dd = (1 - fraction)*mean_dd
         whole_own = (1 - fraction)*mean_own
@@ -95,5 +76,7 @@ contains
         p = (pp + ag)/(2*p)
         sum = sum + q
     end subroutine next_term
+
+    include 'whole_periods.inc'
 
 end module frb_flow_tangent_periods

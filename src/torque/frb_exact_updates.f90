@@ -225,12 +225,7 @@ contains
         real(wp) :: alpha, beta, c, part1, part2, m1, m2, m3
         integer :: i1, i2, i3
 
-        i1 = body%order(1)
-        i2 = body%order(2)
-        i3 = body%order(3)
-        m1 = m(i1)
-        m2 = m(i2)
-        m3 = body%parity*m(i3)
+        call sort_momentum(body, m, i1, i2, i3, m1, m2, m3)
         k(i1) = body%alpha*(m2*m3)
         k(i2) = -body%beta*(m3*m1)
         k(i3) = body%parity*(body%gamma*(m1*m2))
@@ -245,6 +240,8 @@ contains
                  + (((body%beta - beta)*part1 + (body%alpha - alpha)*part2) &
                     + (2*stretch)*(body%beta*(m1*m1) + body%alpha*(m2*m2)))
     end subroutine sorted_defect
+
+    include '../flow/sorted_momentum.inc'
 
     !> The same for a body given by a tensor, in its axes: K has six elements, and products of m are needed.
     pure subroutine turned_defect(body, stretch, high, low, m, defect, k)

@@ -129,15 +129,7 @@ contains
     !> n bodies that are alike.
     subroutine extrapolate_alike(body, scene, time, m, q, tolerance, t, step, compensated, stat, report)
         type(rigid_body), intent(in) :: body
-        class(body_scene), intent(inout) :: scene
-        real(wp), intent(in) :: time
-        real(wp), contiguous, intent(inout) :: m(:, :), q(:, :)
-        real(wp), intent(in) :: tolerance
-        real(wp), intent(inout), optional :: t
-        real(wp), intent(in), optional :: step
-        logical, intent(in), optional :: compensated
-        integer, intent(out), optional :: stat
-        type(extrapolation_report), intent(out), optional :: report
+        include 'bodies_arguments.inc'
 
         call extrapolate_bodies([body], scene, time, m, q, tolerance, t, step, compensated, stat, report)
     end subroutine extrapolate_alike
@@ -145,16 +137,7 @@ contains
     !> n bodies, one after another.
     subroutine extrapolate_bodies(body, scene, time, m, q, tolerance, t, step, compensated, stat, report)
         type(rigid_body), intent(in) :: body(:)                     !! n bodies, or one for all
-        class(body_scene), intent(inout) :: scene                   !! the torque on each
-        real(wp), intent(in) :: time
-        real(wp), contiguous, intent(inout) :: m(:, :)              !! angular momenta (3, n), body frames
-        real(wp), contiguous, intent(inout) :: q(:, :)              !! attitudes (4, n), unit quaternions
-        real(wp), intent(in) :: tolerance
-        real(wp), intent(inout), optional :: t                      !! goes on unless a body is refused
-        real(wp), intent(in), optional :: step
-        logical, intent(in), optional :: compensated
-        integer, intent(out), optional :: stat                      !! the first code that is not `status_ok`
-        type(extrapolation_report), intent(out), optional :: report !! sums, and extremes of all
+        include 'bodies_arguments.inc'
         type(extrapolation_report) :: one, told
         real(wp) :: t_now
         integer :: code, refused, i

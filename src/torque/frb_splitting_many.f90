@@ -243,10 +243,7 @@ contains
                 end do
             end if
         end if
-        if (associated(run%drift) .and. code == status_ok) then
-            if (.not. all(ieee_is_finite(run%m))) code = status_bad_momentum
-            if (.not. all(ieee_is_finite(run%q))) code = status_bad_attitude
-        end if
+        call check_drifted(run, code)
     end subroutine advance
 
     !> All bodies, in place: the batch form of the free flow, or the user's drift one by one.

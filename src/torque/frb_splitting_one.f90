@@ -218,10 +218,7 @@ contains
                 call turn_state(run%core, turn, run%m, run%m_rest, run%q, run%q_rest)
             end if
         end if
-        if (associated(run%drift) .and. code == status_ok) then
-            if (.not. all(ieee_is_finite(run%m))) code = status_bad_momentum
-            if (.not. all(ieee_is_finite(run%q))) code = status_bad_attitude
-        end if
+        call check_drifted(run, code)
     end subroutine advance
 
     !> Keeps the state at the start of a step.

@@ -237,8 +237,7 @@ contains
 
         associate (unused_self => self, unused_q => q, unused_t => t)
         end associate
-        v = ieee_value(v, ieee_quiet_nan)
-        stat = status_ok
+        call no_potential(v, stat)
     end subroutine body_potential_unknown
 
     !> The potential energy of all at the attitudes q (4, n) and time t, as for one body.
@@ -251,9 +250,17 @@ contains
 
         associate (unused_self => self, unused_q => q, unused_t => t)
         end associate
+        call no_potential(v, stat)
+    end subroutine group_potential_unknown
+
+    !> What a scene without a potential answers.
+    pure subroutine no_potential(v, stat)
+        real(wp), intent(out) :: v
+        integer, intent(out) :: stat
+
         v = ieee_value(v, ieee_quiet_nan)
         stat = status_ok
-    end subroutine group_potential_unknown
+    end subroutine no_potential
 
     !> The hook of runs on many processes. `integrate` calls it wherever it may have to end the run: once at
     !> the start, after each torque, after a drift that closes a step, after each drift of the user's and
