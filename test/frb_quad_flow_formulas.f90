@@ -14,6 +14,8 @@ contains
 
     include '../src/flow/series_formulas.inc'
 
+    include '../src/flow/short_coefficients.inc'
+
     include '../src/flow/short_third_kind.inc'
 
     include '../src/flow/tiny_formulas.inc'
@@ -25,6 +27,8 @@ contains
     include '../src/flow/unit_turn_formulas.inc'
 
     include '../src/flow/middle_formulas.inc'
+
+    include '../src/flow/middle_coefficients.inc'
 
     include '../src/flow/middle_third_kind.inc'
 

@@ -340,9 +340,13 @@ contains
 
     include 'series_formulas.inc'
 
+    include 'short_coefficients.inc'
+
     include 'short_third_kind.inc'
 
     include 'middle_formulas.inc'
+
+    include 'middle_coefficients.inc'
 
     include 'middle_third_kind.inc'
 

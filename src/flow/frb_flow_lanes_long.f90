@@ -261,6 +261,8 @@ contains
 
     include 'middle_formulas.inc'
 
+    include 'middle_coefficients.inc'
+
     include 'middle_third_kind.inc'
 
     include 'long_formulas.inc'

@@ -50,11 +50,13 @@ contains
         call find_first_parts(body%b, of, it, at(1))
         now = 1
         do i = nint(maxval(it%squares)), 1, -1
-            call double_squares(i, body%b, of, it, at(now), at(3 - now))
+            call double_squares(it, at(now), at(3 - now))
+            call finish_doubling(i, it%squares, body%b, of%nu, it%norm, it%z, at(now), at(3 - now))
             now = 3 - now
         end do
         do i = nint(maxval(it%triples)), 1, -1
-            call double_triples(i, body%b, of, it, at(now), at(3 - now))
+            call double_triples(it, at(now), at(3 - now))
+            call finish_doubling(i, it%triples, body%b, of%nu, it%norm, it%z, at(now), at(3 - now))
             now = 3 - now
         end do
         call find_momenta(body%b, of, it, at(now), ends)
@@ -129,44 +131,31 @@ contains
         end do
     end subroutine find_first_parts
 
-    !> The doubling that is followed by i - 1 others of this kind: see double_square.
-    pure subroutine double_squares(i, b, of, it, from, to)
-        integer, intent(in) :: i
-        real(wp), intent(in) :: b
-        type(lane_forms), intent(in) :: of
+    !> The triple at twice the time, by double_square.
+    pure subroutine double_squares(it, from, to)
         type(doubling_lanes), intent(inout) :: it
         type(lane_triples), intent(in) :: from
         type(lane_triples), intent(inout) :: to
-        real(wp) :: y, s, c, d, z, ec, es
+        real(wp) :: y, c, d, z
         integer :: l
 
         do l = 1, lanes
             y = from%y(l)
             z = 1.0_wp
             call double_square(it%pmax(l), it%pmin(l), y, c, d, z)
-            s = sqrt(y)
-            ec = from%ec(l)
-            es = from%es(l)
-            call double_angle(of%nu(l), b*it%norm(l), from%y(l), 1.0_wp, s, c*d, z, ec, es)
-            to%s(l) = s
+            to%s(l) = sqrt(y)
             to%c(l) = c
             to%d(l) = d
-            to%ec(l) = ec
-            to%es(l) = es
             it%z(l) = z
         end do
-        call keep_doubled(i, it%squares, it%z, from, to)
     end subroutine double_squares
 
-    !> A doubling of the triple, followed by i - 1 others: see double_triple.
-    pure subroutine double_triples(i, b, of, it, from, to)
-        integer, intent(in) :: i
-        real(wp), intent(in) :: b
-        type(lane_forms), intent(in) :: of
+    !> The triple at twice the time, by double_triple.
+    pure subroutine double_triples(it, from, to)
         type(doubling_lanes), intent(inout) :: it
         type(lane_triples), intent(in) :: from
         type(lane_triples), intent(inout) :: to
-        real(wp) :: s, c, d, z, ec, es
+        real(wp) :: s, c, d, z
         integer :: l
 
         do l = 1, lanes
@@ -175,37 +164,35 @@ contains
             d = from%d(l)
             z = 1.0_wp
             call double_triple(it%pmax(l), it%delta(l), s, c, d, z)
-            ec = from%ec(l)
-            es = from%es(l)
-            call double_angle(of%nu(l), b*it%norm(l), from%y(l), 1.0_wp, s, c*d, z, ec, es)
             to%s(l) = s
             to%c(l) = c
             to%d(l) = d
-            to%ec(l) = ec
-            to%es(l) = es
             it%z(l) = z
         end do
-        call keep_doubled(i, it%triples, it%z, from, to)
     end subroutine double_triples
 
-    !> Divides the doubled triple by its denominator z and the angle by its size, and doubles the integrals;
-    !> lanes with less than i doublings left stay as they were.
-    pure subroutine keep_doubled(i, left, z, from, to)
+    !> The angle at twice the time, divided by its size, the triple divided by its denominator z, and the
+    !> integrals; lanes with less than i doublings of a kind left stay as they were.
+    pure subroutine finish_doubling(i, left, b, nu, norm, z, from, to)
         integer, intent(in) :: i
-        real(wp), intent(in) :: left(lanes), z(lanes)
+        real(wp), intent(in) :: left(lanes)     !! doublings of this kind
+        real(wp), intent(in) :: b, nu(lanes), norm(lanes), z(lanes)
         type(lane_triples), intent(in) :: from
         type(lane_triples), intent(inout) :: to
         real(wp) :: s, c, d, over, dd, own, ec, es
         integer :: l
 
         do l = 1, lanes
+            ec = from%ec(l)
+            es = from%es(l)
+            call double_angle(nu(l), b*norm(l), from%y(l), 1.0_wp, to%s(l), to%c(l)*to%d(l), z(l), ec, es)
             over = 1/z(l)
             s = to%s(l)*over
             c = to%c(l)*over
             d = to%d(l)*over
-            over = 1/(abs(to%ec(l)) + abs(to%es(l)))
-            ec = to%ec(l)*over
-            es = to%es(l)*over
+            over = 1/(abs(ec) + abs(es))
+            ec = ec*over
+            es = es*over
             dd = from%dd(l)
             own = from%own(l)
             call double_integrals(from%s(l), from%d(l), s, d, dd, own)
@@ -218,7 +205,7 @@ contains
             to%ec(l) = merge(ec, from%ec(l), left(l) >= i)
             to%es(l) = merge(es, from%es(l), left(l) >= i)
         end do
-    end subroutine keep_doubled
+    end subroutine finish_doubling
 
     !> Momentum at mid-step and at the end; from here on c belongs to p and d to r.
     pure subroutine find_momenta(b, of, it, at, ends)
@@ -320,6 +307,8 @@ contains
     end subroutine find_columns
 
     include 'middle_formulas.inc'
+
+    include 'middle_coefficients.inc'
 
     include 'middle_third_kind.inc'
 

@@ -75,11 +75,15 @@ contains
 
     include 'middle_formulas.inc'
 
+    include 'short_coefficients.inc'
+
     include 'tangent_short_integrals.inc'
 
     include 'tangent_tiny_integrals.inc'
 
     include 'tangent_step_momentum.inc'
+
+    include 'middle_coefficients.inc'
 
     include 'tangent_middle_formulas.inc'
 

@@ -293,6 +293,8 @@ contains
 
     include 'series_formulas.inc'
 
+    include 'short_coefficients.inc'
+
     include 'short_third_kind.inc'
 
     include 'tangent_short_integrals.inc'

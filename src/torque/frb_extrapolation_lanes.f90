@@ -202,6 +202,8 @@ contains
 
     include '../flow/series_formulas.inc'
 
+    include '../flow/short_coefficients.inc'
+
     include '../flow/short_third_kind.inc'
 
     include '../flow/tiny_formulas.inc'
