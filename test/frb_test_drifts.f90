@@ -2,7 +2,7 @@
 module frb_test_drifts
     use frb_checks, only: tally, worst_of
     use frb_drifts, only: drift_by_name, flow_drift, matrix_drift, quaternion_drift
-    use frb_free_flow, only: rigid_body
+    use frb_free_flow, only: free_flow, rigid_body
     use frb_invariants, only: kinetic_energy, norm_defect, spatial_momentum
     use frb_kinds, only: wp
     use frb_rotations, only: quat_to_matrix
@@ -24,7 +24,7 @@ contains
     subroutine test_drifts(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('drifts', 91)
+        call t%open_suite('drifts', 123)
         call test_runs(t)
         call test_tensors(t)
         call test_almost_aligned(t)
@@ -142,35 +142,51 @@ contains
     end subroutine test_almost_aligned
 
     !> A body by its tensor conserves as much as the same body by its moments, with every drift, plain and
-    !> compensated: eight bodies of each kind, root mean squares of the errors at the end.
+    !> compensated, by steps of half a radian and of some radians: eight bodies of each kind, root mean
+    !> squares of the errors at the end. So does a group of such bodies, which the free flow moves in lanes.
     subroutine test_tensors(t)
         type(tally), intent(inout) :: t
         character(9), parameter :: names(3) = ['free_flow', 'frb_step ', 'quat_step']
         character(11), parameter :: modes(2) = ['plain      ', 'compensated']
         character(8), parameter :: kept(4) = ['energy  ', 'momentum', 'norm    ', 'q-m     ']
+        character(5), parameter :: lengths(2) = ['     ', '-long']
+        real(wp), parameter :: steps(2) = [0.5_wp, 4.7_wp]
         real(wp), parameter :: moments(3) = [0.6_wp, 0.8_wp, 1.0_wp]
         class(body_drift), allocatable :: drift
-        real(wp) :: r(3, 3), m0(3), lost(4, 2), x(4)
-        integer :: i, k, mode
+        type(rigid_body) :: bodies(8)
+        real(wp) :: r(3, 3), m0(3), lost(4, 2), x(4), starts(3, 8), group(4)
+        integer :: i, k, mode, length
 
-        do k = 1, size(names)
-            call drift_by_name(trim(names(k)), drift)
-            do mode = 1, 2
+        do k = 1, size(names)*size(modes)*size(lengths)
+            mode = 1 + mod(k - 1, size(modes))
+            length = 1 + mod((k - 1)/size(modes), size(lengths))
+            associate (name => names(1 + (k - 1)/(size(modes)*size(lengths))))
+                call drift_by_name(trim(name), drift)
                 lost = 0.0_wp
                 do i = 1, 8
                     x = [1.0_wp, sin(10.0_wp*i), cos(17.0_wp*i), sin(23.0_wp*i)]
                     r = quat_to_matrix(x/norm2(x))
                     m0 = (1 + 0.01_wp*i)*[1.8_wp, 0.4_wp, -0.9_wp]
-                    lost(:, 1) = lost(:, 1) + lost_by(rigid_body(moments), m0, drift, mode == 2)**2
-                    lost(:, 2) = lost(:, 2) + lost_by(rigid_body(turned_tensor(r)), matmul(r, m0), drift, &
-                                                      mode == 2)**2
+                    bodies(i) = rigid_body(turned_tensor(r))
+                    starts(:, i) = matmul(r, m0)
+                    lost(:, 1) = lost(:, 1) + lost_by(rigid_body(bodies(i)%moments()), m0, drift, mode == 2, &
+                                                      steps(length))**2
+                    lost(:, 2) = lost(:, 2) + lost_by(bodies(i), starts(:, i), drift, mode == 2, &
+                                                      steps(length))**2
                 end do
                 lost = sqrt(lost/8)
                 do i = 1, 4
-                    call t%at_most(trim(names(k))//'-'//trim(modes(mode))//'-of-a-tensor-keeps-the-'// &
-                                   trim(kept(i))//'-as-of-its-moments', lost(i, 2), 3*lost(i, 1) + 2*eps)
+                    call t%at_most(trim(name)//'-'//trim(modes(mode))//trim(lengths(length))// &
+                                   '-of-a-tensor-keeps-the-'//trim(kept(i))//'-as-of-its-moments', &
+                                   lost(i, 2), 3*lost(i, 1) + 2*eps)
                 end do
-            end do
+                if (trim(name) /= 'free_flow' .or. mode == 2) cycle
+                group = lost_by_group(bodies, starts, steps(length))
+                do i = 1, 4
+                    call t%at_most('a-group'//trim(lengths(length))//'-of-tensors-keeps-the-'// &
+                                   trim(kept(i))//'-as-of-its-moments', group(i), 3*lost(i, 1) + 2*eps)
+                end do
+            end associate
         end do
 
     contains
@@ -184,12 +200,33 @@ contains
             tensor = (tensor + transpose(tensor))/2
         end function turned_tensor
 
-        !> Relative change of energy and |m|, |q| - 1, and the change of Q m, in 8000 steps without torque.
-        function lost_by(body, m0, drift, compensated) result(lost)
+        !> The errors of `lost_by` for bodies in one batch, root mean squares.
+        function lost_by_group(bodies, m0, h) result(lost)
+            type(rigid_body), intent(in) :: bodies(:)
+            real(wp), intent(in) :: m0(:, :), h
+            real(wp) :: lost(4)
+            real(wp) :: m(3, size(bodies)), q(4, size(bodies))
+            integer :: step, i
+
+            m = m0
+            q = spread([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], 2, size(bodies))
+            do step = 1, t%many(8000)
+                call free_flow(bodies, h, m, q)
+            end do
+            lost = 0.0_wp
+            do i = 1, size(bodies)
+                lost = lost + lost_between(bodies(i), m0(:, i), m(:, i), q(:, i))**2
+            end do
+            lost = sqrt(lost/size(bodies))
+        end function lost_by_group
+
+        !> The errors of 8000 steps h without torque.
+        function lost_by(body, m0, drift, compensated, h) result(lost)
             type(rigid_body), intent(in) :: body
             real(wp), intent(in) :: m0(3)
             class(body_drift), intent(in) :: drift
             logical, intent(in) :: compensated
+            real(wp), intent(in) :: h
             real(wp) :: lost(4)
             type(heavy_top) :: weightless
             real(wp) :: m(3), q(4)
@@ -197,11 +234,20 @@ contains
             weightless%force = 0.0_wp
             m = m0
             q = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-            call integrate(body, splitting_scheme('strang'), weightless, 0.5_wp, t%many(8000), m, q, &
-                           drift=drift, compensated=compensated)
+            call integrate(body, splitting_scheme('strang'), weightless, h, t%many(8000), m, q, drift=drift, &
+                           compensated=compensated)
+            lost = lost_between(body, m0, m, q)
+        end function lost_by
+
+        !> Relative change of energy and |m|, |q| - 1, and the change of Q m; at the start q = 1.
+        function lost_between(body, m0, m, q) result(lost)
+            type(rigid_body), intent(in) :: body
+            real(wp), intent(in) :: m0(3), m(3), q(4)
+            real(wp) :: lost(4)
+
             lost = [kinetic_energy(body, m)/kinetic_energy(body, m0) - 1, norm2(m)/norm2(m0) - 1, &
                     norm_defect(q), norm2(spatial_momentum(m, q) - m0)/norm2(m0)]
-        end function lost_by
+        end function lost_between
 
     end subroutine test_tensors
 

@@ -17,7 +17,7 @@ module frb_inertia
     private
 
     public :: body_core, core_from_moments, core_from_tensor, principal_axes, sorting_order
-    public :: keep_off_axis
+    public :: keep_off_axis, axes_of, to_principal, from_principal
 
     real(wp), parameter :: identity(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, &
                                                      0.0_wp, 0.0_wp, 1.0_wp], [3, 3])
@@ -40,7 +40,9 @@ module frb_inertia
         real(c_double) :: parity = 1.0_wp             !! -1 when `order` is an odd permutation, else +1
         logical(c_bool) :: linear = .false.           !! a linear rotor
         logical(c_bool) :: needs_rotation = .false.   !! body axes are not principal, or the rotor is linear
-        real(c_double) :: axes(3, 3) = identity       !! columns: principal axes in body axes
+        real(c_double) :: axes_high(3, 3) = identity  !! columns: principal axes in body axes, their first 26
+                                                      !! bits
+        real(c_double) :: axes_low(3, 3) = 0.0_wp     !! the rest: the sum is orthogonal to 1e-23
         real(c_double) :: axes_q(4) = no_turn         !! the same rotation as a quaternion, principal to body
         real(c_double) :: axis(3) = 0.0_wp            !! axis of a linear rotor's zero moment, in body axes
     end type body_core
@@ -104,13 +106,64 @@ contains
             return
         end if
         core = core_from_moments(moments)
-        core%axes = axes
         core%axes_q = matrix_to_quat(axes)
+        call split_rotation(axes, core%axes_high, core%axes_low)
         if (core%linear) core%axis = matmul(axes, core%axis)
         ! Any element off the diagonal counts: the cosine of an angle below 1e-8 rounds to 1.
         core%needs_rotation = core%linear .or. any(abs(axes - identity) > 0.0_wp)
         if (core%needs_rotation .and. .not. core%linear) core%lane = 4*core%parity
     end function core_from_tensor
+
+    !> A rotation A, known to rounding, as high + low: orthogonal to 1e-23 together, as A - A S/2 is with S =
+    !> A^T A - 1, to terms of S^2. The 26 bits of high have exact products and exact sums of products.
+    pure subroutine split_rotation(axes, high, low)
+        real(wp), intent(in) :: axes(3, 3)
+        real(wp), intent(out) :: high(3, 3), low(3, 3)
+        real(wp), parameter :: cut = 2.0_wp**27
+        real(wp) :: defect(3, 3)
+
+        high = (axes + cut) - cut
+        low = axes - high
+        defect = matmul(transpose(high), high) - identity
+        defect = defect + (matmul(transpose(high), low) + matmul(transpose(low), axes))
+        low = low - 0.5_wp*matmul(axes, defect)
+    end subroutine split_rotation
+
+    !> The principal axes, to rounding: columns, in body axes.
+    pure function axes_of(core) result(axes)
+        type(body_core), intent(in) :: core
+        real(wp) :: axes(3, 3)
+
+        axes = core%axes_high + core%axes_low
+    end function axes_of
+
+    !> A vector of the body in its principal axes. A matrix of rounded axes would change |m| and the energy in
+    !> every long step by the same part of an epsilon. Of two parts, only the sums are rounded, as often up as
+    !> down.
+    pure function to_principal(core, v) result(w)
+        type(body_core), intent(in) :: core
+        real(wp), intent(in) :: v(3)            !! in body axes
+        real(wp) :: w(3)
+        integer :: k
+
+        do k = 1, 3
+            w(k) = (core%axes_high(1, k)*v(1) + core%axes_high(2, k)*v(2) + core%axes_high(3, k)*v(3)) &
+                   + (core%axes_low(1, k)*v(1) + core%axes_low(2, k)*v(2) + core%axes_low(3, k)*v(3))
+        end do
+    end function to_principal
+
+    !> A vector in principal axes as one of the body: the inverse of `to_principal`.
+    pure function from_principal(core, v) result(w)
+        type(body_core), intent(in) :: core
+        real(wp), intent(in) :: v(3)            !! in principal axes
+        real(wp) :: w(3)
+        integer :: k
+
+        do k = 1, 3
+            w(k) = (core%axes_high(k, 1)*v(1) + core%axes_high(k, 2)*v(2) + core%axes_high(k, 3)*v(3)) &
+                   + (core%axes_low(k, 1)*v(1) + core%axes_low(k, 2)*v(2) + core%axes_low(k, 3)*v(3))
+        end do
+    end function from_principal
 
     !> Removes from m the component along the axis of a linear rotor, if it is more than rounding. If it is
     !> more than 1e-8 of the momentum, `code` is `status_bad_momentum` and m stays as it is.

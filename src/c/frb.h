@@ -30,8 +30,8 @@ extern "C" {
 #endif
 
 /* Sizes of the opaque types in doubles; the library does not compile with others. */
-#define FRB_BODY_DOUBLES 30
-#define FRB_MOTION_DOUBLES 60
+#define FRB_BODY_DOUBLES 39
+#define FRB_MOTION_DOUBLES 69
 
 typedef struct { double opaque[FRB_BODY_DOUBLES]; } frb_body;
 typedef struct { double opaque[FRB_MOTION_DOUBLES]; } frb_motion;

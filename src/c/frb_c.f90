@@ -7,7 +7,7 @@ module frb_c
     use frb_flow_one, only: flow_body
     use frb_free_flow, only: rigid_body
     use frb_free_motion, only: free_motion
-    use frb_inertia, only: body_core, core_from_moments, core_from_tensor
+    use frb_inertia, only: axes_of, body_core, core_from_moments, core_from_tensor
     use frb_status, only: status_message, status_ok, status_bad_moments, status_bad_tensor, &
         status_bad_momentum, status_bad_time, status_bad_count
     use frb_release, only: version
@@ -17,7 +17,7 @@ module frb_c
     private
 
     !> Sizes of the opaque types of frb.h, in doubles; a motion has room to spare.
-    integer, parameter :: body_doubles = 30, motion_doubles = 60
+    integer, parameter :: body_doubles = 39, motion_doubles = 69
     !> Bodies gathered at a time where memory has other strides than the library.
     integer, parameter :: chunk = 64
 
@@ -73,7 +73,7 @@ contains
         if (.not. c_associated(axes)) return
         call c_f_pointer(axes, nine)
         ! C stores row after row.
-        nine%x = transpose(core%axes)
+        nine%x = transpose(axes_of(core))
     end function c_body_axes
 
     !> The flow of one body.

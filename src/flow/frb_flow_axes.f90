@@ -2,7 +2,7 @@
 module frb_flow_axes
     use frb_flow_momentum, only: flow_momentum => flow_one
     use frb_flow_state, only: flow_state => flow_one
-    use frb_inertia, only: body_core, keep_off_axis
+    use frb_inertia, only: body_core, from_principal, keep_off_axis, to_principal
     use frb_kinds, only: wp
     use frb_status, only: status_ok, status_bad_momentum, status_bad_attitude
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
@@ -48,14 +48,14 @@ contains
         end if
         ! The change of m, not rounded to the digits of m: with nearly principal axes the small part that the
         ! rotation adds would be rounded away in every step, and |m| would drift.
-        change = matmul(m, body%axes)
+        change = to_principal(body, m)
         if (present(q)) then
             turn = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
             call flow_state(body, h, change, code, 0.0_wp, turn)
             if (code == status_ok) call turn_back(body, change, turn, m, q)
         else
             call flow_momentum(body, h, change, code, 0.0_wp)
-            if (code == status_ok) m = m + matmul(body%axes, change)
+            if (code == status_ok) m = m + from_principal(body, change)
         end if
     end subroutine flow_in_principal_axes
 
@@ -68,8 +68,8 @@ contains
         real(wp), intent(inout) :: m(3), q(4)
         real(wp) :: w(3), w0
 
-        m = m + matmul(body%axes, change)
-        w = matmul(body%axes, turn(2:4))
+        m = m + from_principal(body, change)
+        w = from_principal(body, turn(2:4))
         w0 = turn(1) - 1
         if (turn(1) > 0.5_wp) w0 = -sum(w*w)/(1 + sqrt(1 - sum(w*w)))
         q = q + [q(1)*w0 - (q(2)*w(1) + q(3)*w(2) + q(4)*w(3)), &

@@ -22,7 +22,8 @@ module frb_flow_blocks
         logical :: all_plain                !! all lanes have plain numbers
         integer :: axes_are                 !! same_axes, shifted_axes, turned_axes
         integer :: column(3)                !! place of each body axis in the columns of increments
-        real(wp) :: axes(lanes, 3, 3)       !! turned: (:, i, k), component along body axis i of cyclic axis k
+        real(wp) :: high(lanes, 3, 3)       !! turned: (:, i, k), along body axis i of cyclic axis k,
+        real(wp) :: low(lanes, 3, 3)        !! in two parts: see to_principal of frb_inertia
     end type block_of_bodies
 
 contains
@@ -45,7 +46,7 @@ contains
         type(block_of_bodies), intent(inout) :: block
         real(wp) :: t(lanes), axis
         integer(int64) :: plain_lanes, turned, apart
-        integer :: l, full, last
+        integer :: l, full, last, cyclic(3)
 
         full = whole(count)
         call gather(body, first, count, full, block)
@@ -75,11 +76,10 @@ contains
         if (block%axes_are /= turned_axes) return
         do l = 1, full
             associate (given => body(min(size(body), first + min(l, count) - 1)))
-                if (given%parity > 0) then
-                    block%axes(l, :, :) = given%axes(:, given%order)
-                else
-                    block%axes(l, :, :) = given%axes(:, given%order([3, 2, 1]))
-                end if
+                cyclic = given%order
+                if (given%parity < 0) cyclic = given%order([3, 2, 1])
+                block%high(l, :, :) = given%axes_high(:, cyclic)
+                block%low(l, :, :) = given%axes_low(:, cyclic)
             end associate
         end do
     end subroutine set_bodies
@@ -224,9 +224,12 @@ contains
             x1 = u1(l)
             x2 = u2(l)
             x3 = u3(l)
-            v(l, 1) = block%axes(l, 1, 1)*x1 + (block%axes(l, 2, 1)*x2 + block%axes(l, 3, 1)*x3)
-            v(l, 2) = block%axes(l, 1, 2)*x1 + (block%axes(l, 2, 2)*x2 + block%axes(l, 3, 2)*x3)
-            v(l, 3) = block%axes(l, 1, 3)*x1 + (block%axes(l, 2, 3)*x2 + block%axes(l, 3, 3)*x3)
+            v(l, 1) = (block%high(l, 1, 1)*x1 + block%high(l, 2, 1)*x2 + block%high(l, 3, 1)*x3) &
+                      + (block%low(l, 1, 1)*x1 + block%low(l, 2, 1)*x2 + block%low(l, 3, 1)*x3)
+            v(l, 2) = (block%high(l, 1, 2)*x1 + block%high(l, 2, 2)*x2 + block%high(l, 3, 2)*x3) &
+                      + (block%low(l, 1, 2)*x1 + block%low(l, 2, 2)*x2 + block%low(l, 3, 2)*x3)
+            v(l, 3) = (block%high(l, 1, 3)*x1 + block%high(l, 2, 3)*x2 + block%high(l, 3, 3)*x3) &
+                      + (block%low(l, 1, 3)*x1 + block%low(l, 2, 3)*x2 + block%low(l, 3, 3)*x3)
         end do
     end subroutine to_cyclic
 
@@ -251,9 +254,12 @@ contains
             v1 = v(l, 1)
             v2 = v(l, 2)
             v3 = v(l, 3)
-            v(l, 1) = block%axes(l, 1, 1)*v1 + (block%axes(l, 1, 2)*v2 + block%axes(l, 1, 3)*v3)
-            v(l, 2) = block%axes(l, 2, 1)*v1 + (block%axes(l, 2, 2)*v2 + block%axes(l, 2, 3)*v3)
-            v(l, 3) = block%axes(l, 3, 1)*v1 + (block%axes(l, 3, 2)*v2 + block%axes(l, 3, 3)*v3)
+            v(l, 1) = (block%high(l, 1, 1)*v1 + block%high(l, 1, 2)*v2 + block%high(l, 1, 3)*v3) &
+                      + (block%low(l, 1, 1)*v1 + block%low(l, 1, 2)*v2 + block%low(l, 1, 3)*v3)
+            v(l, 2) = (block%high(l, 2, 1)*v1 + block%high(l, 2, 2)*v2 + block%high(l, 2, 3)*v3) &
+                      + (block%low(l, 2, 1)*v1 + block%low(l, 2, 2)*v2 + block%low(l, 2, 3)*v3)
+            v(l, 3) = (block%high(l, 3, 1)*v1 + block%high(l, 3, 2)*v2 + block%high(l, 3, 3)*v3) &
+                      + (block%low(l, 3, 1)*v1 + block%low(l, 3, 2)*v2 + block%low(l, 3, 3)*v3)
         end do
     end subroutine from_cyclic
 

@@ -11,7 +11,7 @@ module frb_flow_tangent_body
     use frb_flow_tangent_momentum, only: short_jacobian
     use frb_flow_tangent_one, only: short_tangent
     use frb_flow_tangent_parts, only: step_parts
-    use frb_inertia, only: body_core, keep_off_axis
+    use frb_inertia, only: axes_of, body_core, keep_off_axis, to_principal
     use frb_kinds, only: wp
     use frb_rotations, only: cross
     use frb_status, only: status_ok, status_bad_momentum, status_bad_attitude, status_bad_time
@@ -202,7 +202,7 @@ contains
         integer, intent(out) :: code
         include 'tangent_results.inc'
         type(body_core) :: principal
-        real(wp) :: n(3), old(3), change(4), c(3)
+        real(wp) :: axes(3, 3), n(3), old(3), change(4), c(3)
 
         call keep_off_axis(body, m, code)
         if (code /= status_ok) then
@@ -211,12 +211,13 @@ contains
         end if
         principal = body
         principal%needs_rotation = .false.
-        old = matmul(m, body%axes)
+        axes = axes_of(body)
+        old = to_principal(body, m)
         n = old
         if (.not. present(q)) then
             call tangent_body(principal, h, n, code, 0, jacobian=jacobian)
             if (code == status_ok) call flow_body(body, h, m, code)
-            jacobian = in_axes(body%axes, jacobian)
+            jacobian = in_axes(axes, jacobian)
             if (body%linear) call drop_axis(body%axis, jacobian)
             return
         end if
@@ -226,14 +227,14 @@ contains
         ! adds.
         c = 2*cross(change(2:4), old)
         if (code == status_ok) call turn_back(body, cross(change(2:4), c) - change(1)*c, change, m, q)
-        transition(1:3, 1:3) = in_axes(body%axes, transition(1:3, 1:3))
-        transition(4:6, 1:3) = matmul(body%axes, matmul(transition(4:6, 1:3), transpose(body%axes)))
-        transition(4:6, 4:6) = in_axes(body%axes, transition(4:6, 4:6))
+        transition(1:3, 1:3) = in_axes(axes, transition(1:3, 1:3))
+        transition(4:6, 1:3) = matmul(axes, matmul(transition(4:6, 1:3), transpose(axes)))
+        transition(4:6, 4:6) = in_axes(axes, transition(4:6, 4:6))
         if (body%linear) call drop_axis(body%axis, transition(:, 1:3))
         if (.not. present(by_inertia)) return
-        by_inertia(1:3, :) = matmul(body%axes, by_inertia(1:3, :))
-        by_inertia(4:6, :) = matmul(body%axes, by_inertia(4:6, :))
-        if (elements == 6) by_inertia = matmul(by_inertia, elements_in_axes(body%axes))
+        by_inertia(1:3, :) = matmul(axes, by_inertia(1:3, :))
+        by_inertia(4:6, :) = matmul(axes, by_inertia(4:6, :))
+        if (elements == 6) by_inertia = matmul(by_inertia, elements_in_axes(axes))
     end subroutine tangent_turned
 
     !> R x R^T for columns R of axes, that of 1 being 1: a matrix close to 1 is so to all digits.

@@ -6,8 +6,8 @@
 !> advanced in place by the time h, of any sign and size. Short steps, by series, add increments to m and q:
 !> rounding errors of N steps grow like a random walk, and the norms do not drift. A longer step multiplies q
 !> by a turn of norm one to rounding: if all steps are equal, rounding can add up by at most one epsilon per
-!> step; for a body by its tensor also with unequal steps, and in m too, because its axes are orthogonal to
-!> rounding only. Within these errors a quaternion keeps its norm, and a matrix its defect of orthogonality.
+!> step. Within this error a quaternion keeps its norm, and a matrix its defect of orthogonality. A body by
+!> its tensor keeps as much as the same body by its moments (suite `drifts`).
 !>
 !> Errors (`stat`): the status of a body that could not be made; `status_bad_momentum`, `status_bad_time`,
 !> `status_bad_attitude` for NaN, Inf and a quaternion of norm zero; `status_bad_count` for arrays that do not
@@ -25,7 +25,7 @@
 module frb_free_flow
     use frb_flow_bodies, only: flow_many
     use frb_flow_one, only: flow_body
-    use frb_inertia, only: body_core, core_from_moments, core_from_tensor
+    use frb_inertia, only: axes_of, body_core, core_from_moments, core_from_tensor
     use frb_kinds, only: wp
     use frb_status, only: return_or_stop, status_ok, status_bad_attitude, status_bad_count
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
@@ -188,7 +188,7 @@ contains
         class(rigid_body), intent(in) :: self
         real(wp) :: axes(3, 3)
 
-        axes = self%core%axes
+        axes = axes_of(self%core)
     end function axes_of_body
 
     !> Whether the body is a linear rotor: one moment is 0.

@@ -7,7 +7,7 @@
 module frb_free_motion
     use frb_flow_periods, only: quarter_period
     use frb_free_flow, only: flow_tangent, core_of, free_flow, rigid_body
-    use frb_inertia, only: body_core, keep_off_axis
+    use frb_inertia, only: body_core, keep_off_axis, to_principal
     use frb_kinds, only: wp, two_pi
     use frb_rotations, only: norm3, quat_product, quat_rotate
     use frb_status, only: return_or_stop, status_ok, status_bad_attitude, status_bad_count, &
@@ -124,7 +124,7 @@ contains
 
         associate (body => core_of(motion%body))
             n = motion%m0
-            if (body%needs_rotation) n = matmul(n, body%axes)
+            if (body%needs_rotation) n = to_principal(body, n)
             em = exponent(maxval(abs(n)))
             ea = exponent(body%a(1))
             n = scale(n(body%order), -em)

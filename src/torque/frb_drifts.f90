@@ -3,7 +3,7 @@
 module frb_drifts
     use frb_flow_axes, only: turn_back
     use frb_free_flow, only: core_of, free_flow, rigid_body
-    use frb_inertia, only: body_core, core_from_moments, keep_off_axis
+    use frb_inertia, only: body_core, core_from_moments, keep_off_axis, to_principal
     use frb_kinds, only: wp, most_points
     use frb_matrix_step, only: frb_step
     use frb_quat_step, only: quat_step
@@ -105,7 +105,7 @@ contains
         call prepare(body, m, core, stat)
         if (stat /= status_ok) return
         old = m
-        if (core%needs_rotation) old = matmul(m, core%axes)
+        if (core%needs_rotation) old = to_principal(core, m)
         n = old
         turn = identity
         call frb_step(n, turn, h, core%moments, old, identity, self%points, stat)
@@ -132,7 +132,7 @@ contains
         call prepare(body, m, core, stat)
         if (stat /= status_ok) return
         if (core%needs_rotation) then
-            old = matmul(m, core%axes)
+            old = to_principal(core, m)
             n = old
             turn = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
             call quat_step(n, turn, h, core%moments, old, turn, self%points, self%frame, stat)

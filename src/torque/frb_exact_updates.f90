@@ -250,8 +250,8 @@ contains
         real(wp), intent(out) :: defect, k(3)
         real(wp) :: form(3, 3), all_of_it(6), main(6), part(6), c, u(3), v(3), n(3)
 
-        u = body%axes(:, body%order(1))
-        v = body%axes(:, body%order(2))
+        u = body%axes_high(:, body%order(1)) + body%axes_low(:, body%order(1))
+        v = body%axes_high(:, body%order(2)) + body%axes_low(:, body%order(2))
         form = body%beta*spread(u, 1, 3)*spread(u, 2, 3) + body%alpha*spread(v, 1, 3)*spread(v, 2, 3)
         n = matmul(form, m)
         k = [n(2)*m(3) - n(3)*m(2), n(3)*m(1) - n(1)*m(3), n(1)*m(2) - n(2)*m(1)]

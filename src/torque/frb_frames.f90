@@ -5,7 +5,7 @@
 !> norm is more than 1e-6 off one give NaN.
 module frb_frames
     use frb_free_flow, only: core_of, rigid_body
-    use frb_inertia, only: body_core
+    use frb_inertia, only: axes_of, body_core
     use frb_kinds, only: wp
     use frb_modified_kicks, only: angular_response
     use frb_rotations, only: rotate_one => quat_rotate, quat_conjugate, unit_tolerance
@@ -66,7 +66,7 @@ contains
         type(body_core), intent(in) :: core
         logical, intent(in) :: inverse
         real(wp) :: matrix(3, 3)
-        real(wp) :: d(3)
+        real(wp) :: d(3), axes(3, 3)
         integer :: k
 
         d = core%moments
@@ -75,10 +75,11 @@ contains
         else if (inverse) then
             where (d > 0.0_wp) d = 1/d
         end if
+        axes = axes_of(core)
         do k = 1, 3
-            matrix(:, k) = d*core%axes(k, :)
+            matrix(:, k) = d*axes(k, :)
         end do
-        matrix = matmul(core%axes, matrix)
+        matrix = matmul(axes, matrix)
     end function matrix_of
 
     !> I^-1 v or I v of one body, without a matrix where the axes are principal.

@@ -1,6 +1,7 @@
 !> Conserved quantities: energy, momentum in space, norms; and an observer that monitors them.
 module frb_invariants
     use frb_free_flow, only: core_of, rigid_body
+    use frb_inertia, only: to_principal
     use frb_kinds, only: wp
     use frb_rotations, only: quat_rotate
     use frb_status, only: status_ok
@@ -75,7 +76,7 @@ contains
 
         associate (core => core_of(body))
             along = m
-            if (core%needs_rotation) along = matmul(m, core%axes)
+            if (core%needs_rotation) along = to_principal(core, m)
             energy = 0.5_wp*sum(core%a*along(core%order)**2)
             if (core%status /= status_ok) energy = ieee_value(energy, ieee_quiet_nan)
         end associate

@@ -15,7 +15,7 @@
 !>
 !> Sources: M. Suzuki, Phys. Lett. A 201 (1995) 425, S. A. Chin, Phys. Lett. A 226 (1997) 344 for flat space.
 module frb_modified_kicks
-    use frb_inertia, only: body_core
+    use frb_inertia, only: body_core, from_principal, to_principal
     use frb_kinds, only: wp
     use frb_rotations, only: cross, quat_product
     implicit none
@@ -34,9 +34,9 @@ contains
         if (core%linear) then
             w = core%a(1)*(v - core%axis*dot_product(core%axis, v))
         else if (core%needs_rotation) then
-            w = matmul(v, core%axes)
+            w = to_principal(core, v)
             w(core%order) = core%a*w(core%order)
-            w = matmul(core%axes, w)
+            w = from_principal(core, w)
         else
             w(core%order) = core%a*v(core%order)
         end if

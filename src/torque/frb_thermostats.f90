@@ -1,7 +1,7 @@
 !> Heat baths for rigid bodies: the exact step of friction and noise, to be put between drifts and kicks.
 module frb_thermostats
     use frb_free_flow, only: core_of, rigid_body
-    use frb_inertia, only: body_core
+    use frb_inertia, only: body_core, from_principal, to_principal
     use frb_kinds, only: wp
     use frb_status, only: return_or_stop, status_ok, status_bad_count, status_bad_momentum, &
         status_bad_option, status_bad_time
@@ -125,10 +125,10 @@ contains
                     sigma = sqrt(temperature)*sqrt(core%moments)*width
                 end if
                 if (core%needs_rotation) then
-                    along = matmul(m(:, i), core%axes)
+                    along = to_principal(core, m(:, i))
                     along = decay*along + sigma*noise(:, i)
                     where (.not. core%moments > 0.0_wp) along = 0.0_wp
-                    m(:, i) = matmul(core%axes, along)
+                    m(:, i) = from_principal(core, along)
                 else
                     m(:, i) = decay*m(:, i) + sigma*noise(:, i)
                 end if
