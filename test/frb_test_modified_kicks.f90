@@ -69,22 +69,26 @@ contains
         call t%close_to('the-change-is-that-of-the-torque', change, (forth - back)/(2*small), 1.0e-9_wp)
     end subroutine test_change
 
-    !> Torque and its change g by one call against two calls, for a body in any axes; an extension of the
-    !> heavy top gets its own torque.
+    !> Torque and its change g by one call against two calls, for a body in any axes and two centres, one of
+    !> them on the third axis; an extension of the heavy top gets its own torque.
     subroutine test_both(t)
         type(tally), intent(inout) :: t
         real(wp), parameter :: response(3, 3) = reshape([1.4_wp, 0.2_wp, -0.3_wp, 0.2_wp, 0.9_wp, 0.1_wp, &
                                                          -0.3_wp, 0.1_wp, 1.1_wp], [3, 3])
         type(heavy_top) :: top
         type(turning_top) :: heir
-        real(wp) :: q(4), tau(3), g(3), tau_alone(3), g_alone(3)
-        integer :: stat
+        real(wp) :: q(4), tau(3), g(3), tau_alone(3), g_alone(3), worst
+        integer :: stat, i
 
-        top = heavy_top(force=[0.3_wp, -0.7_wp, 1.1_wp], centre=[0.5_wp, 0.9_wp, -0.4_wp])
         q = [0.1_wp, 0.7_wp, 0.5_wp, 0.5_wp]
-        call top%torque_and_gradient(q, 0.0_wp, response, tau, g, stat)
-        call one_after_the_other(top, q, 0.0_wp, response, tau_alone, g_alone, stat)
-        call t%at_most('torque-and-g-at-once', largest([abs(tau - tau_alone), abs(g - g_alone)]), 16*eps)
+        worst = 0.0_wp
+        do i = 0, 1
+            top = heavy_top(force=[0.3_wp, -0.7_wp, 1.1_wp], centre=[0.5_wp*i, 0.9_wp*i, -0.4_wp])
+            call top%torque_and_gradient(q, 0.0_wp, response, tau, g, stat)
+            call one_after_the_other(top, q, 0.0_wp, response, tau_alone, g_alone, stat)
+            worst = largest([worst, abs(tau - tau_alone), abs(g - g_alone)])
+        end do
+        call t%at_most('torque-and-g-at-once', worst, 16*eps)
         heir%heavy_top = top
         call heir%torque_and_gradient(q, 0.7_wp, response, tau, g, stat)
         call one_after_the_other(heir, q, 0.7_wp, response, tau_alone, g_alone, stat)

