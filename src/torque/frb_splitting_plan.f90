@@ -70,8 +70,8 @@ contains
         type(splitting_scheme), intent(in) :: scheme
         real(wp), intent(in) :: h
         type(splitting_plan) :: plan
-        real(wp) :: a(scheme%drifts), b(scheme%kicks), passed
-        integer :: i, s, first
+        real(wp) :: a, passed
+        integer :: i, s, first, centre
 
         plan%status = scheme%status
         if (plan%status == status_ok .and. .not. is_step(scheme, h)) plan%status = status_bad_time
@@ -81,16 +81,20 @@ contains
         allocate (plan%drift(s + 1), source=0.0_wp)
         allocate (plan%kick(s), plan%time(s), plan%modified(s), source=0.0_wp)
         if (s == 0) return
-        a = scheme%drift_coefficients()
-        b = scheme%kick_coefficients()
-        plan%kick(:) = b*h
-        if (scheme%has_modified_kicks()) plan%modified(:) = scheme%modified_coefficients()*h*h*h
-        first = merge(1, 2, scheme%drift_first)
-        plan%drift(first:first + scheme%drifts - 1) = a*h
+        ! From the halves: an array of all coefficients would be one more to allocate, in a call that may make
+        ! one step only.
+        do i = 1, s
+            centre = min(i, s + 1 - i)
+            plan%kick(i) = scheme%half_b(centre)*h
+            plan%modified(i) = scheme%half_c(centre)*h*h*h
+        end do
+        first = merge(0, 1, scheme%drift_first)
         passed = 0.0_wp
-        do i = first, s
-            passed = passed + a(i + 1 - first)
-            plan%time(i) = passed*h
+        do i = 1, scheme%drifts
+            a = scheme%half_a(min(i, scheme%drifts + 1 - i))
+            passed = passed + a
+            plan%drift(first + i) = a*h
+            if (first + i <= s) plan%time(first + i) = passed*h
         end do
         if (.not. scheme%drift_first) plan%time(s) = h
     end function plan_of_step
@@ -133,7 +137,7 @@ contains
         if (present(joined)) basis%joined = joined
         basis%largest_torque = largest/max(1.0_wp, maxval(abs(plan%kick)))
         basis%largest_gradient = largest/max(1.0_wp, maxval(abs(plan%modified)))
-        if (scheme%has_modified_kicks()) basis%displacement = 0.25_wp*h*h
+        if (any(abs(plan%modified) > 0.0_wp)) basis%displacement = 0.25_wp*h*h
         basis%on_request = scheme%displaced
     end function new_basis
 
