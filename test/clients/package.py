@@ -16,8 +16,8 @@ def refused(status, call, *arguments, kind=frb.FrbError, **keywords):
     try:
         call(*arguments, **keywords)
     except kind as error:
-        assert status is None or error.args[1] == status, error
-        assert error.args[0] and "unknown status" not in str(error.args[0]), error
+        assert status is None or error.status == status, error
+        assert str(error) and str(error) == error.args[0] and "unknown status" not in str(error), error
     else:
         sys.exit(f"{call} {arguments} was not refused")
 

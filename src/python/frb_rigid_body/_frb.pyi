@@ -5,7 +5,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-class FrbError(ValueError): ...
+class FrbError(ValueError):
+    status: int
 
 class Bodies:
     def __new__(cls, numbers: Array, width: int) -> Bodies: ...
