@@ -11,7 +11,7 @@ module frb_flow_blocks
     implicit none
     private
 
-    public :: block_of_bodies, set_bodies, step_block, whole
+    public :: block_of_bodies, set_bodies, step_block, whole, polynomial_of_rho
 
     integer, parameter :: same_axes = 1, shifted_axes = 2, turned_axes = 3
 

@@ -27,7 +27,7 @@ module frb_flow_lanes
     implicit none
     private
 
-    public :: lanes, vector, classes, limits, lane_bodies, workspace, measure, step_lanes
+    public :: lanes, vector, classes, limits, angle_as_size, lane_bodies, workspace, measure, step_lanes
 
     integer, parameter :: lanes = 64    !! bodies in a block
     integer, parameter :: vector = 8    !! blocks are filled to whole vectors: no loop ends with a part

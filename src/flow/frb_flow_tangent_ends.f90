@@ -70,8 +70,9 @@ contains
     end subroutine set_forms
 
     !> Advances m and q, and forms the derivatives; results of lanes that are not served have no meaning.
-    pure subroutine finish_lanes(body, of, it, m, q, transition)
+    pure subroutine finish_lanes(body, orbits, of, it, m, q, transition)
         type(lane_body), intent(in) :: body
+        type(lane_orbits), intent(in) :: orbits
         type(lane_forms), intent(in) :: of
         type(lane_ends), intent(in) :: it
         real(wp), intent(inout) :: m(3*lanes), q(4*lanes), transition(36*lanes)
@@ -82,7 +83,8 @@ contains
             place(3*k - 2:3*k) = body%order + 6*(body%order(k) - 1)
         end do
         associate (o => body%order)
-            call set_attitudes(of, it, q(1), q(1 + o(1)), q(1 + o(2)), q(1 + o(3)), x)
+            call set_attitudes(of, it, orbits%q(:, 1), orbits%q(:, 1 + o(1)), orbits%q(:, 1 + o(2)), &
+                               orbits%q(:, 1 + o(3)), q(1), q(1 + o(1)), q(1 + o(2)), q(1 + o(3)), x)
             call put_matrices(of%side, x, place + 21, transition)
             call set_jacobians(body%b, of, it, m(o(1)), m(o(2)), m(o(3)), x)
             call put_matrices(of%side, x, place, transition)
@@ -107,9 +109,10 @@ contains
     end subroutine put_matrices
 
     !> Attitudes at the end, and E.
-    pure subroutine set_attitudes(of, it, a0, a1, a2, a3, x)
+    pure subroutine set_attitudes(of, it, b0, b1, b2, b3, a0, a1, a2, a3, x)
         type(lane_forms), intent(in) :: of
         type(lane_ends), intent(in) :: it
+        real(wp), intent(in), dimension(lanes) :: b0, b1, b2, b3        !! at the start
         real(wp), intent(inout), dimension(of_q) :: a0, a1, a2, a3
         real(wp), intent(inout) :: x(lanes, 9)
         real(wp) :: w1, w3, q0, q1, q2, q3, u1, u3
@@ -125,10 +128,10 @@ contains
             ! The turn in cyclic axes: in the mirror form it has the other sign.
             u1 = merge(w1, -w3, first)
             u3 = merge(w3, -w1, first)
-            q0 = a0(4*l - 3)
-            q1 = a1(4*l - 3)
-            q2 = a2(4*l - 3)
-            q3 = a3(4*l - 3)
+            q0 = b0(l)
+            q1 = b1(l)
+            q2 = b2(l)
+            q3 = b3(l)
             call turn(it%w0(l), u1, of%side(l)*it%w2(l), u3, q0, q1, q2, q3)
             a0(4*l - 3) = q0
             a1(4*l - 3) = q1

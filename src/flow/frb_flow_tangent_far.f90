@@ -62,7 +62,7 @@ contains
         call find_momenta(body%b, of, it, at(now), ends)
         call find_turns(body%b, of, it, at(now), ends)
         call find_columns(body%b, of, it, at(now), ends)
-        call finish_lanes(body, of, ends, m, q, transition)
+        call finish_lanes(body, orbits, of, ends, m, q, transition)
     end subroutine step_far
 
     !> The number of doublings of each lane, and the square of the part of the time before them.

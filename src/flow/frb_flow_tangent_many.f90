@@ -1,10 +1,12 @@
 !> Many equal bodies with the derivatives of their step: the bodies of a block share SIMD lanes, blocks are
 !> shared among threads.
 module frb_flow_tangent_many
+    use frb_flow_blocks, only: polynomial_of_rho
     use frb_flow_limits, only: plain_largest
     use frb_flow_tangent_body, only: tangent_body
     use frb_flow_tangent_far, only: step_far
-    use frb_flow_tangent_lanes, only: lanes, near, far, lane_body, lane_orbits, load_lanes, keep_lanes
+    use frb_flow_tangent_lanes, only: lanes, kinds, tiny, far, lane_body, lane_orbits, load_lanes, &
+        keep_lanes
     use frb_flow_tangent_near, only: step_near
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
@@ -33,7 +35,7 @@ contains
 
         refused = status_ok
         in_lanes = body%status == status_ok .and. .not. body%needs_rotation .and. is_plain_time(body, h)
-        of = body_of_lanes(body, 0.5_wp*h)
+        if (in_lanes) of = body_of_lanes(body, 0.5_wp*h)
         !$omp parallel do if (n >= 64*lanes) private(whole, served, i, count, one) reduction(max: refused)
         do first = 1, n, lanes
             count = min(lanes, n - first + 1)
@@ -60,12 +62,22 @@ contains
         real(wp), intent(in) :: t
         type(lane_body) :: of
 
+        of%rate = body%a(1)*t
+        of%rho = polynomial_of_rho(body%a)
         if (body%parity > 0.0_wp) then
-            of = lane_body(body%order, body%alpha*t, body%beta*t, body%gamma*t, body%a(1)*t, body%a(3)*t, &
-                           (body%a(1)*t)**2)
+            of%order = body%order
+            of%a = body%alpha*t
+            of%b = body%beta*t
+            of%g = body%gamma*t
+            of%first = of%rate
+            of%last = body%a(3)*t
         else
-            of = lane_body(body%order(3:1:-1), -body%gamma*t, -body%beta*t, -body%alpha*t, body%a(3)*t, &
-                           body%a(1)*t, (body%a(1)*t)**2)
+            of%order = body%order(3:1:-1)
+            of%a = -body%gamma*t
+            of%b = -body%beta*t
+            of%g = -body%alpha*t
+            of%first = body%a(3)*t
+            of%last = of%rate
         end if
     end function body_of_lanes
 
@@ -78,33 +90,32 @@ contains
         logical, intent(inout) :: served(lanes)
         real(wp) :: some_m(3, lanes), some_q(4, lanes)
         type(lane_orbits) :: orbits
-        integer :: l, nears, fars
+        integer :: l, kind, many(kinds)
 
-        associate (o => of%order)
-            if (count == lanes) then
-                call load_lanes(of, m(o(1), 1), m(o(2), 1), m(o(3), 1), q, orbits, nears, fars)
-                whole = max(nears, fars) == lanes
-                if (whole) then
-                    call step_lanes(nears > 0, of, orbits, m, q, transition)
-                    return
-                end if
+        if (count == lanes) then
+            call load_lanes(of, m, q, orbits, many)
+            whole = maxval(many) == lanes
+            if (whole) then
+                call step_lanes(maxloc(many, 1), of, orbits, m, q, transition)
+                return
             end if
+        else
             do l = 1, lanes
                 some_m(:, l) = m(:, min(l, count))
                 some_q(:, l) = q(:, min(l, count))
             end do
-            call load_lanes(of, some_m(o(1), 1), some_m(o(2), 1), some_m(o(3), 1), some_q, orbits, nears, &
-                            fars)
-        end associate
+            call load_lanes(of, some_m, some_q, orbits, many)
+        end if
         whole = .false.
         served = .false.
-        if (nears > 0) call step_some(near, of, orbits, count, m, q, transition, served)
-        if (fars > 0) call step_some(far, of, orbits, count, m, q, transition, served)
+        do kind = 1, kinds
+            if (many(kind) > 0) call step_some(kind, of, orbits, count, m, q, transition, served)
+        end do
     end subroutine step_block
 
     !> Advances the lanes of one kind.
     pure subroutine step_some(kind, of, orbits, count, m, q, transition, served)
-        real(wp), intent(in) :: kind
+        integer, intent(in) :: kind
         type(lane_body), intent(in) :: of
         type(lane_orbits), intent(in) :: orbits
         integer, intent(in) :: count
@@ -116,11 +127,7 @@ contains
         integer :: l
 
         call keep_lanes(kind, orbits, kept, here)
-        some_q = 1.0_wp
-        do l = 1, count
-            if (here(l)) some_q(:, l) = q(:, l)
-        end do
-        call step_lanes(kind <= near, of, kept, some_m, some_q, some)
+        call step_lanes(kind, of, kept, some_m, some_q, some)
         do l = 1, count
             if (.not. here(l)) cycle
             m(:, l) = some_m(:, l)
@@ -131,17 +138,17 @@ contains
     end subroutine step_some
 
     !> Advances a whole block.
-    pure subroutine step_lanes(is_near, of, orbits, m, q, transition)
-        logical, intent(in) :: is_near
+    pure subroutine step_lanes(kind, of, orbits, m, q, transition)
+        integer, intent(in) :: kind
         type(lane_body), intent(in) :: of
         type(lane_orbits), intent(in) :: orbits
         real(wp), intent(inout) :: m(3, lanes), q(4, lanes), transition(36, lanes)
 
         call clear(transition)
-        if (is_near) then
-            call step_near(of, orbits, m, q, transition)
-        else
+        if (kind == far) then
             call step_far(of, orbits, m, q, transition)
+        else
+            call step_near(kind == tiny, of, orbits, m, q, transition)
         end if
     end subroutine step_lanes
 

@@ -19,7 +19,7 @@ contains
         real(wp), intent(inout) :: m(3), jacobian(3, 3)
         logical, intent(out) :: done
         real(wp) :: a, b, g, m1, m2, m3, p, r, y, scd, dd, aa, bb, k, e1, e2, e3, x1, x2, x3, s1, s2, s3
-        real(wp) :: inverse, over_c, over_d, over_cc, over_dd, f0, lp, lr
+        real(wp) :: inverse, over_c, over_d, over_cc, over_dd
         real(wp) :: j11, j12, j13, j21, j22, j23, j31, j32, j33
         integer :: i1, i2, i3
 
@@ -45,7 +45,7 @@ contains
             aa = k*aa
             bb = k*bb
         end if
-        call divide_once(a*g, m2, p, r, y, scd, aa, bb, inverse, over_c, over_d, over_cc, over_dd, f0, lp, lr)
+        call invert_all(a*g, m2, p, r, y, scd, inverse, over_c, over_d, over_cc, over_dd)
         call momentum_at_end(a, b, g, m1, m2, m3, p, r, y, scd, inverse, e1, e2, e3, x1, x2, x3, s1, s2, s3)
         e1 = m1 + e1
         e2 = m2 + e2

@@ -1,5 +1,6 @@
-!> Short steps of a block of bodies, one body per SIMD lane: see tangent_step_momentum.inc and
-!> tangent_step_turn.inc. The loops are short, so that a processor has several vectors in work.
+!> Short steps of a block of bodies, one body per SIMD lane: see tangent_step_turn.inc. The loops are short,
+!> so that a processor has several vectors in work. The shortest steps take rho and its gradient from the
+!> polynomial of frb_flow_lanes, in a seventh less time.
 module frb_flow_tangent_near
     use frb_flow_limits, only: plain_smallest
     use frb_flow_tangent_lanes, only: lanes, lane_body, lane_orbits, of_m, of_q, of_phi
@@ -13,18 +14,18 @@ module frb_flow_tangent_near
     type :: series_lanes
         real(wp), dimension(lanes) :: y, scd, dd, aa, bb, third     !! s^2, s c d; D, A, B, H
         real(wp), dimension(lanes) :: nu, side                      !! of the form; 1: first, -1: mirror form
-        real(wp), dimension(lanes) :: inverse, over_c, over_d, over_cc, over_dd, f0, lp, lr    !! divide_once
-        real(wp), dimension(lanes) :: e1, e2, e3, x1, x2, x3, s1, s2, s3    !! m'; momentum_at_end
-        real(wp), dimension(lanes) :: j11, j12, j13, j21, j22, j23, j31, j32, j33   !! J - 1
+        real(wp), dimension(lanes) :: over_cc, over_dd, over_d0, l1, l2, l3     !! middle_momentum
+        real(wp), dimension(lanes) :: l11, l12, l13, l21, l22, l23, l31, l32, l33
         real(wp), dimension(lanes) :: psi, cotangent, slope         !! turn_rate
-        real(wp), dimension(lanes) :: kappa, r1, r2, r3     !! kappa_1, grad rho (times 4 F/(1 + |Y|^2))
-        real(wp), dimension(lanes) :: y1, y2, y3, twice, k1, k2, k3, h1, h2, h3     !! turn_factors
+        real(wp), dimension(lanes) :: kappa, r1, r2, r3             !! kappa_1, grad rho
+        real(wp), dimension(lanes) :: y1, y2, y3, twice, k1, k2, k3, e1, e2, e3     !! turn_of_middle; m'
     end type series_lanes
 
 contains
 
     !> Advances the lanes of a block, of which all that are served have short steps.
-    pure subroutine step_near(body, of, m, q, phi)
+    pure subroutine step_near(is_tiny, body, of, m, q, phi)
+        logical, intent(in) :: is_tiny      !! the first terms of the series are enough
         type(lane_body), intent(in) :: body
         type(lane_orbits), intent(in) :: of
         real(wp), intent(inout) :: m(3*lanes), q(4*lanes), phi(36*lanes)
@@ -36,21 +37,29 @@ contains
         end do
         w = j + 3
         e = j + 21
-        call find_series(body, of, it)
-        call find_inverses(body, of, it)
-        call find_angles(body, of, it)
+        if (is_tiny) then
+            call find_tiny_series(of, it)
+        else
+            call find_series(body, of, it)
+        end if
+        call find_middles(body, of, it)
+        call find_gradients(body, of, it)
+        if (is_tiny) then
+            call find_tiny_rates(body, of, it)
+        else
+            call find_angles(body, of, it)
+            call find_rates(body, of, it)
+        end if
         associate (o => body%order)
             call find_momenta(body, of, it, m(o(1)), m(o(2)), m(o(3)))
-            call find_jacobians(body, of, it, &
-                                phi(j(1, 1)), phi(j(2, 1)), phi(j(3, 1)), phi(j(1, 2)), phi(j(2, 2)), &
-                                phi(j(3, 2)), phi(j(1, 3)), phi(j(2, 3)), phi(j(3, 3)))
-            call find_rates(body, of, it)
-            call find_turns(body, of, it)
-            call set_attitudes(it, q(1), q(1 + o(1)), q(1 + o(2)), q(1 + o(3)), &
-                               phi(e(1, 1)), phi(e(2, 1)), phi(e(3, 1)), phi(e(1, 2)), phi(e(2, 2)), &
-                               phi(e(3, 2)), phi(e(1, 3)), phi(e(2, 3)), phi(e(3, 3)))
-            call set_turns(it, phi(w(1, 1)), phi(w(2, 1)), phi(w(3, 1)), phi(w(1, 2)), phi(w(2, 2)), &
-                           phi(w(3, 2)), phi(w(1, 3)), phi(w(2, 3)), phi(w(3, 3)))
+            call set_attitudes(it, of%q(:, 1), of%q(:, 1 + o(1)), of%q(:, 1 + o(2)), of%q(:, 1 + o(3)), &
+                               q(1), q(1 + o(1)), q(1 + o(2)), q(1 + o(3)))
+            call set_turns(it, phi(j(1, 1)), phi(j(2, 1)), phi(j(3, 1)), phi(j(1, 2)), phi(j(2, 2)), &
+                           phi(j(3, 2)), phi(j(1, 3)), phi(j(2, 3)), phi(j(3, 3)), &
+                           phi(w(1, 1)), phi(w(2, 1)), phi(w(3, 1)), phi(w(1, 2)), phi(w(2, 2)), &
+                           phi(w(3, 2)), phi(w(1, 3)), phi(w(2, 3)), phi(w(3, 3)), &
+                           phi(e(1, 1)), phi(e(2, 1)), phi(e(3, 1)), phi(e(1, 2)), phi(e(2, 2)), &
+                           phi(e(3, 2)), phi(e(1, 3)), phi(e(2, 3)), phi(e(3, 3)))
         end associate
     end subroutine step_near
 
@@ -77,83 +86,115 @@ contains
         end do
     end subroutine find_series
 
-    !> All inverses of the momentum and its derivative.
-    pure subroutine find_inverses(body, of, it)
+    !> The first terms of the triple and the integrals.
+    pure subroutine find_tiny_series(of, it)
+        type(lane_orbits), intent(in) :: of
+        type(series_lanes), intent(inout) :: it
+        real(wp) :: p, r, dd
+        integer :: l
+
+        do l = 1, lanes
+            p = of%p(l)
+            r = of%r(l)
+            call tiny_series(p + r, p*r, it%y(l), it%scd(l))
+            call tiny_integrals(p + r, p*r, p, r, dd, it%aa(l), it%bb(l))
+        end do
+    end subroutine find_tiny_series
+
+    !> L.
+    pure subroutine find_middles(body, of, it)
         type(lane_body), intent(in) :: body
         type(lane_orbits), intent(in) :: of
         type(series_lanes), intent(inout) :: it
         integer :: l
 
         do l = 1, lanes
-            call divide_once(body%a*body%g, of%m2(l), of%p(l), of%r(l), it%y(l), it%scd(l), it%aa(l), &
-                             it%bb(l), it%inverse(l), it%over_c(l), it%over_d(l), it%over_cc(l), &
-                             it%over_dd(l), it%f0(l), it%lp(l), it%lr(l))
+            call middle_momentum(body%a, body%b, body%g, of%m1(l), of%m2(l), of%m3(l), of%p(l), of%r(l), &
+                                 it%y(l), it%scd(l), it%over_cc(l), it%over_dd(l), it%over_d0(l), it%l1(l), &
+                                 it%l2(l), it%l3(l))
         end do
-    end subroutine find_inverses
+    end subroutine find_middles
 
-    !> Momenta at the end.
+    !> The derivative of L.
+    pure subroutine find_gradients(body, of, it)
+        type(lane_body), intent(in) :: body
+        type(lane_orbits), intent(in) :: of
+        type(series_lanes), intent(inout) :: it
+        integer :: l
+
+        do l = 1, lanes
+            call middle_by_momentum(body%a, body%b, body%g, of%m1(l), of%m2(l), of%m3(l), of%p(l), of%r(l), &
+                                    it%y(l), it%scd(l), it%aa(l), it%bb(l), it%over_cc(l), it%over_dd(l), &
+                                    it%over_d0(l), it%l1(l), it%l2(l), it%l3(l), &
+                                    it%l11(l), it%l12(l), it%l13(l), it%l21(l), it%l22(l), it%l23(l), &
+                                    it%l31(l), it%l32(l), it%l33(l))
+        end do
+    end subroutine find_gradients
+
+    !> The turn Y, and momenta at the end.
     pure subroutine find_momenta(body, of, it, n1, n2, n3)
         type(lane_body), intent(in) :: body
         type(lane_orbits), intent(in) :: of
         type(series_lanes), intent(inout) :: it
         real(wp), intent(inout), dimension(of_m) :: n1, n2, n3
-        real(wp) :: m1, m2, m3, d1, d2, d3
+        real(wp) :: d1, d2, d3, twice
         integer :: l
 
         do l = 1, lanes
-            m1 = of%m1(l)
-            m2 = of%m2(l)
-            m3 = of%m3(l)
-            call momentum_at_end(body%a, body%b, body%g, m1, m2, m3, of%p(l), of%r(l), it%y(l), it%scd(l), &
-                                 it%inverse(l), d1, d2, d3, it%x1(l), it%x2(l), it%x3(l), &
-                                 it%s1(l), it%s2(l), it%s3(l))
-            m1 = m1 + d1
-            m2 = m2 + d2
-            m3 = m3 + d3
-            it%e1(l) = m1
-            it%e2(l) = m2
-            it%e3(l) = m3
-            n1(3*l - 2) = m1
-            n2(3*l - 2) = m2
-            n3(3*l - 2) = m3
+            call turn_of_middle(body%a, body%b, body%g, it%l1(l), it%l2(l), it%l3(l), it%kappa(l), it%y(l), &
+                                it%scd(l), it%y1(l), it%y2(l), it%y3(l), twice, it%k1(l), it%k2(l), &
+                                it%k3(l), d1, d2, d3)
+            d1 = of%m1(l) + d1
+            d2 = of%m2(l) + d2
+            d3 = of%m3(l) + d3
+            it%e1(l) = d1
+            it%e2(l) = d2
+            it%e3(l) = d3
+            n1(3*l - 2) = d1
+            n2(3*l - 2) = d2
+            n3(3*l - 2) = d3
+            it%twice(l) = twice
+            it%r1(l) = twice*it%r1(l)
+            it%r2(l) = twice*it%r2(l)
+            it%r3(l) = twice*it%r3(l)
         end do
     end subroutine find_momenta
 
-    !> J.
-    pure subroutine find_jacobians(body, of, it, t11, t21, t31, t12, t22, t32, t13, t23, t33)
+    !> kappa_1 and grad rho by the polynomial of frb_flow_lanes.
+    pure subroutine find_tiny_rates(body, of, it)
         type(lane_body), intent(in) :: body
         type(lane_orbits), intent(in) :: of
         type(series_lanes), intent(inout) :: it
-        real(wp), intent(inout), dimension(of_phi) :: t11, t21, t31, t12, t22, t32, t13, t23, t33
-        real(wp) :: j11, j12, j13, j21, j22, j23, j31, j32, j33
+        real(wp) :: m1, m2, m3, x1, x2, x3, a2, u, e, f0, f1, f2, f3, by_u, by_e
         integer :: l
 
-        do l = 1, lanes
-            call jacobian_at_end(body%a, body%b, body%g, of%m1(l), of%m2(l), of%m3(l), it%e1(l), it%e2(l), &
-                                 it%e3(l), it%x1(l), it%x2(l), it%x3(l), it%s1(l), it%s2(l), it%s3(l), &
-                                 it%y(l), it%scd(l), it%aa(l), it%bb(l), it%inverse(l), it%over_c(l), &
-                                 it%over_d(l), it%over_cc(l), it%over_dd(l), &
-                                 j11, j12, j13, j21, j22, j23, j31, j32, j33)
-            it%j11(l) = j11
-            it%j12(l) = j12
-            it%j13(l) = j13
-            it%j21(l) = j21
-            it%j22(l) = j22
-            it%j23(l) = j23
-            it%j31(l) = j31
-            it%j32(l) = j32
-            it%j33(l) = j33
-            t11(36*l - 35) = 1 + j11
-            t21(36*l - 35) = j21
-            t31(36*l - 35) = j31
-            t12(36*l - 35) = j12
-            t22(36*l - 35) = 1 + j22
-            t32(36*l - 35) = j32
-            t13(36*l - 35) = j13
-            t23(36*l - 35) = j23
-            t33(36*l - 35) = 1 + j33
-        end do
-    end subroutine find_jacobians
+        a2 = body%first - body%g
+        associate (c => body%rho, rate => body%rate)
+            do l = 1, lanes
+                m1 = of%m1(l)
+                m2 = of%m2(l)
+                m3 = of%m3(l)
+                x1 = m1*m1
+                x2 = m2*m2
+                x3 = m3*m3
+                u = rate*(rate*(x1 + (x2 + x3)))
+                e = rate*(body%first*x1 + (a2*x2 + body%last*x3))
+                f0 = c(1) + u*(c(2) + u*(c(3) + u*c(4)))
+                f1 = c(5) + u*(c(6) + u*(c(7) + u*c(8)))
+                f2 = c(9) + u*(c(10) + u*c(11))
+                f3 = c(12) + u*c(13)
+                by_u = (c(1) + u*(2*c(2) + u*(3*c(3) + u*(4*c(4))))) &
+                       + e*((c(6) + u*(2*c(7) + u*(3*c(8)))) + e*((c(10) + u*(2*c(11))) + e*c(13)))
+                by_e = f1 + e*(2*f2 + e*(3*f3 + e*(4*c(14))))
+                it%kappa(l) = body%first + rate*(u*f0 + e*(f1 + e*(f2 + e*(f3 + e*c(14)))))
+                by_u = ((2*rate)*rate)*(rate*by_u)
+                by_e = ((2*rate)*rate)*by_e
+                it%r1(l) = (by_u + body%first*by_e)*m1
+                it%r2(l) = (by_u + a2*by_e)*m2
+                it%r3(l) = (by_u + body%last*by_e)*m3
+            end do
+        end associate
+    end subroutine find_tiny_rates
 
     !> x cot x of the angle.
     pure subroutine find_angles(body, of, it)
@@ -214,34 +255,11 @@ contains
         end do
     end subroutine find_rates
 
-    !> The turn Y, and the factors of W.
-    pure subroutine find_turns(body, of, it)
-        type(lane_body), intent(in) :: body
-        type(lane_orbits), intent(in) :: of
-        type(series_lanes), intent(inout) :: it
-        real(wp) :: f0, f
-        integer :: l
-
-        do l = 1, lanes
-            f0 = it%f0(l)
-            f = f0*(of%m2(l) + it%e2(l))
-            f = f0*small_root((body%a*body%g)*(f*f))
-            call turn_factors(body%a, body%b, body%g, of%m1(l), of%m2(l), of%m3(l), it%e1(l), it%e2(l), &
-                              it%e3(l), it%j21(l), it%j22(l), it%j23(l), it%kappa(l), f, it%lp(l), it%lr(l), &
-                              it%y1(l), it%y2(l), it%y3(l), it%twice(l), it%k1(l), it%k2(l), it%k3(l), &
-                              it%h1(l), it%h2(l), it%h3(l))
-            f = (2*it%twice(l))*f
-            it%r1(l) = f*it%r1(l)
-            it%r2(l) = f*it%r2(l)
-            it%r3(l) = f*it%r3(l)
-        end do
-    end subroutine find_turns
-
-    !> Attitudes at the end, and E.
-    pure subroutine set_attitudes(it, a0, a1, a2, a3, t11, t21, t31, t12, t22, t32, t13, t23, t33)
+    !> Attitudes at the end.
+    pure subroutine set_attitudes(it, b0, b1, b2, b3, a0, a1, a2, a3)
         type(series_lanes), intent(in) :: it
+        real(wp), intent(in), dimension(lanes) :: b0, b1, b2, b3        !! at the start
         real(wp), intent(inout), dimension(of_q) :: a0, a1, a2, a3
-        real(wp), intent(inout), dimension(of_phi) :: t11, t21, t31, t12, t22, t32, t13, t23, t33
         real(wp) :: y1, y2, y3, w0, q0, q1, q2, q3
         integer :: l
 
@@ -250,46 +268,72 @@ contains
             y2 = it%y2(l)
             y3 = it%y3(l)
             w0 = small_norm(y1*y1 + (y2*y2 + y3*y3))
-            q0 = a0(4*l - 3)
-            q1 = a1(4*l - 3)
-            q2 = a2(4*l - 3)
-            q3 = a3(4*l - 3)
+            q0 = b0(l)
+            q1 = b1(l)
+            q2 = b2(l)
+            q3 = b3(l)
             call turn(w0, y1 + w0*y1, y2 + w0*y2, y3 + w0*y3, q0, q1, q2, q3)
             a0(4*l - 3) = q0
             a1(4*l - 3) = q1
             a2(4*l - 3) = q2
             a3(4*l - 3) = q3
-            call turn_at_end(it%twice(l), y1, y2, y3, &
-                             t11(36*l - 35), t12(36*l - 35), t13(36*l - 35), t21(36*l - 35), t22(36*l - 35), &
-                             t23(36*l - 35), t31(36*l - 35), t32(36*l - 35), t33(36*l - 35))
         end do
     end subroutine set_attitudes
 
-    !> W, the derivative of the attitude by the momentum.
-    pure subroutine set_turns(it, t11, t21, t31, t12, t22, t32, t13, t23, t33)
+    !> W, E, and J = E + m' x W.
+    pure subroutine set_turns(it, j11, j21, j31, j12, j22, j32, j13, j23, j33, &
+                              w11, w21, w31, w12, w22, w32, w13, w23, w33, &
+                              e11, e21, e31, e12, e22, e32, e13, e23, e33)
         type(series_lanes), intent(in) :: it
-        real(wp), intent(inout), dimension(of_phi) :: t11, t21, t31, t12, t22, t32, t13, t23, t33
-        real(wp) :: w11, w12, w13, w21, w22, w23, w31, w32, w33
+        real(wp), intent(inout), dimension(of_phi) :: j11, j21, j31, j12, j22, j32, j13, j23, j33
+        real(wp), intent(inout), dimension(of_phi) :: w11, w21, w31, w12, w22, w32, w13, w23, w33
+        real(wp), intent(inout), dimension(of_phi) :: e11, e21, e31, e12, e22, e32, e13, e23, e33
+        real(wp) :: m1, m2, m3, x11, x21, x31, x12, x22, x32, x13, x23, x33
+        real(wp) :: z11, z21, z31, z12, z22, z32, z13, z23, z33
         integer :: l
 
         do l = 1, lanes
-            call turn_by_momentum(it%k1(l), it%k2(l), it%k3(l), it%y1(l), it%y2(l), it%y3(l), it%e1(l), &
-                                  it%e2(l), it%e3(l), it%r1(l), it%r2(l), it%r3(l), &
-                                  it%h1(l), it%h2(l), it%h3(l), &
-                                  it%j11(l), it%j12(l), it%j13(l), it%j21(l), it%j22(l), it%j23(l), &
-                                  it%j31(l), it%j32(l), it%j33(l), &
-                                  w11, w12, w13, w21, w22, w23, w31, w32, w33)
-            t11(36*l - 35) = w11
-            t21(36*l - 35) = w21
-            t31(36*l - 35) = w31
-            t12(36*l - 35) = w12
-            t22(36*l - 35) = w22
-            t32(36*l - 35) = w32
-            t13(36*l - 35) = w13
-            t23(36*l - 35) = w23
-            t33(36*l - 35) = w33
+            m1 = it%e1(l)
+            m2 = it%e2(l)
+            m3 = it%e3(l)
+            call turn_at_end(it%twice(l), it%y1(l), it%y2(l), it%y3(l), &
+                             z11, z12, z13, z21, z22, z23, z31, z32, z33)
+            call turn_by_momentum(it%k1(l), it%k2(l), it%k3(l), it%y1(l), it%y2(l), it%y3(l), it%l1(l), &
+                                  it%l2(l), it%l3(l), it%r1(l), it%r2(l), it%r3(l), &
+                                  it%l11(l), it%l12(l), it%l13(l), it%l21(l), it%l22(l), it%l23(l), &
+                                  it%l31(l), it%l32(l), it%l33(l), &
+                                  x11, x12, x13, x21, x22, x23, x31, x32, x33)
+            e11(36*l - 35) = z11
+            e21(36*l - 35) = z21
+            e31(36*l - 35) = z31
+            e12(36*l - 35) = z12
+            e22(36*l - 35) = z22
+            e32(36*l - 35) = z32
+            e13(36*l - 35) = z13
+            e23(36*l - 35) = z23
+            e33(36*l - 35) = z33
+            w11(36*l - 35) = x11
+            w21(36*l - 35) = x21
+            w31(36*l - 35) = x31
+            w12(36*l - 35) = x12
+            w22(36*l - 35) = x22
+            w32(36*l - 35) = x32
+            w13(36*l - 35) = x13
+            w23(36*l - 35) = x23
+            w33(36*l - 35) = x33
+            j11(36*l - 35) = z11 + (m2*x31 - m3*x21)
+            j21(36*l - 35) = z21 + (m3*x11 - m1*x31)
+            j31(36*l - 35) = z31 + (m1*x21 - m2*x11)
+            j12(36*l - 35) = z12 + (m2*x32 - m3*x22)
+            j22(36*l - 35) = z22 + (m3*x12 - m1*x32)
+            j32(36*l - 35) = z32 + (m1*x22 - m2*x12)
+            j13(36*l - 35) = z13 + (m2*x33 - m3*x23)
+            j23(36*l - 35) = z23 + (m3*x13 - m1*x33)
+            j33(36*l - 35) = z33 + (m1*x23 - m2*x13)
         end do
     end subroutine set_turns
+
+    include 'tiny_formulas.inc'
 
     include 'series_formulas.inc'
 
@@ -297,9 +341,9 @@ contains
 
     include 'short_third_kind.inc'
 
-    include 'tangent_short_integrals.inc'
+    include 'tangent_tiny_integrals.inc'
 
-    include 'tangent_step_momentum.inc'
+    include 'tangent_short_integrals.inc'
 
     include 'tangent_step_turn.inc'
 
