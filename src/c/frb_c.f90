@@ -3,7 +3,7 @@
 !> are global names, and gfortran mixes them up without a message.
 module frb_c
     use frb_c_memory, only: triple, quadruple, matrix, find_state, store_body, usable, all_usable, copied
-    use frb_flow_bodies, only: flow_many
+    use frb_flow_bodies, only: flow_rows
     use frb_flow_one, only: flow_body
     use frb_free_flow, only: rigid_body
     use frb_free_motion, only: free_motion
@@ -109,8 +109,7 @@ contains
         real(c_double), value :: h
         integer(c_int) :: stat
         type(body_core), pointer :: core(:)
-        real(c_double), pointer, contiguous :: words(:, :)
-        real(c_double), pointer :: m_of(:, :), q_of(:, :)
+        real(c_double), pointer, contiguous :: words(:, :), m_of(:, :), q_of(:, :)
         integer :: bodies, code
         logical :: packed
 
@@ -125,12 +124,8 @@ contains
         stat = status_bad_momentum
         if (.not. c_associated(m)) return
         call c_f_pointer(m, m_of, [ldm, n])
-        m_of => m_of(:3, :)
         nullify (q_of)
-        if (c_associated(q)) then
-            call c_f_pointer(q, q_of, [ldq, n])
-            q_of => q_of(:4, :)
-        end if
+        if (c_associated(q)) call c_f_pointer(q, q_of, [ldq, n])
         bodies = merge(1, int(n), ldb == 0)
         packed = ldb == 0 .or. ldb == body_doubles
         if (packed) then
@@ -138,31 +133,32 @@ contains
             packed = all_usable(core)
         end if
         if (packed) then
-            call flow_many(core, ldb == 0, [h], int(n), m_of, code, q_of)
+            call flow_rows(core, ldb == 0, [h], int(n), ldm, ldq, m_of, code, q_of)
         else
             call c_f_pointer(body, words, [max(ldb, int(body_doubles, c_size_t)), int(bodies, c_size_t)])
-            call flow_strided(words, ldb == 0, h, m_of, code, q_of)
+            call flow_strided(words, ldb == 0, h, int(n), ldm, ldq, m_of, code, q_of)
         end if
         stat = int(code, c_int)
     end function c_flow_many
 
     !> The flow of n bodies that are not packed, or were not made: the bodies are copied in chunks.
-    subroutine flow_strided(words, alike, h, m, code, q)
+    subroutine flow_strided(words, alike, h, n, ldm, ldq, m, code, q)
         real(c_double), intent(in), target :: words(:, :)   !! bodies: one, or as many as states
         logical, intent(in) :: alike                        !! the first is meant for all
         real(c_double), intent(in) :: h
-        real(c_double), intent(inout) :: m(:, :)            !! (3, n)
+        integer, intent(in) :: n
+        integer(c_size_t), intent(in) :: ldm, ldq
+        real(c_double), intent(inout) :: m(ldm, n)
         integer, intent(out) :: code
-        real(c_double), intent(inout), optional :: q(:, :)  !! (4, n)
+        real(c_double), intent(inout), optional :: q(ldq, n)
         type(body_core), pointer :: given
         type(body_core) :: part(chunk)
-        integer :: first, last, count, bodies, code_here, i
+        integer :: first, count, bodies, code_here, i
 
         code = status_ok
         bodies = 1
-        do first = 1, size(m, 2), chunk
-            count = min(chunk, size(m, 2) - first + 1)
-            last = first + count - 1
+        do first = 1, n, chunk
+            count = min(chunk, n - first + 1)
             if (size(words, 2) > 1 .or. first == 1) then
                 bodies = min(count, size(words, 2))
                 do i = 1, bodies
@@ -172,10 +168,10 @@ contains
                 end do
             end if
             if (present(q)) then
-                call flow_many(part(:bodies), alike, [h], count, m(:, first:last), code_here, &
-                               q(:, first:last))
+                call flow_rows(part(:bodies), alike, [h], count, ldm, ldq, m(1, first), code_here, &
+                               q(1, first))
             else
-                call flow_many(part(:bodies), alike, [h], count, m(:, first:last), code_here)
+                call flow_rows(part(:bodies), alike, [h], count, ldm, ldq, m(1, first), code_here)
             end if
             code = max(code, code_here)
         end do

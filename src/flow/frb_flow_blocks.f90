@@ -46,10 +46,21 @@ contains
         type(block_of_bodies), intent(inout) :: block
         real(wp) :: t(lanes), axis
         integer(int64) :: plain_lanes, turned, apart
-        integer :: l, full, last, cyclic(3)
+        integer :: l, full, low, last, cyclic(3)
 
         full = whole(count)
-        call gather(body, first, count, full, block)
+        call gather(body, first, count, full, block%lane, block%of)
+        turned = 0
+        apart = 0
+        low = min(size(body), first)
+        do l = low, min(size(body), first - 1 + count)
+            axis = abs(body(l)%lane)
+            turned = turned + merge(1_int64, 0_int64, axis > 3.5_wp)
+            apart = apart + merge(1_int64, 0_int64, abs(axis - abs(body(low)%lane)) > 0.5_wp)
+        end do
+        block%axes_are = merge(same_axes, merge(shifted_axes, turned_axes, turned == 0), apart + turned == 0)
+        block%column = [1, 2, 3]
+        if (block%axes_are == same_axes) block%column = 1 + modulo([4, 5, 6] - int(abs(body(low)%lane)), 3)
         if (size(h) == 1) then
             t(:full) = merge(0.5_wp*h(1), 0.0_wp, abs(h(1)) < plain_largest)
         else
@@ -60,19 +71,12 @@ contains
             t(:full) = merge(0.5_wp*t(:full), 0.0_wp, abs(t(:full)) < plain_largest)
         end if
         call scale_by_time(full, t, block%lane, block%of, plain_lanes)
-        block%of%alike = alike
-        if (alike) call set_polynomial(body(1), full, t, block%of)
         block%all_plain = plain_lanes == full
-        turned = 0
-        apart = 0
-        do l = 1, full
-            axis = abs(block%lane(l))
-            turned = turned + merge(1_int64, 0_int64, axis > 3.5_wp)
-            apart = apart + merge(1_int64, 0_int64, abs(axis - abs(block%lane(1))) > 0.5_wp)
-        end do
-        block%axes_are = merge(same_axes, merge(shifted_axes, turned_axes, turned == 0), apart + turned == 0)
-        block%column = [1, 2, 3]
-        if (block%axes_are == same_axes) block%column = 1 + modulo([4, 5, 6] - int(abs(block%lane(1))), 3)
+        block%of%alike = alike
+        block%of%inverse = body(1)%a
+        block%of%odd = body(1)%lane < 0
+        block%of%full = full
+        block%of%rho_known = .false.
         if (block%axes_are /= turned_axes) return
         do l = 1, full
             associate (given => body(min(size(body), first + min(l, count) - 1)))
@@ -85,30 +89,31 @@ contains
     end subroutine set_bodies
 
     !> Constants as columns, of the only body or of `count` bodies from number `first` on.
-    pure subroutine gather(body, first, count, full, block)
+    pure subroutine gather(body, first, count, full, lane, of)
         type(body_core), intent(in) :: body(:)
         integer, intent(in) :: first, count, full
-        type(block_of_bodies), intent(inout) :: block
-        integer :: l, known, before
+        real(wp), intent(inout) :: lane(lanes)
+        type(lane_bodies), intent(inout) :: of
+        integer :: l, known, last
 
-        known = merge(1, count, size(body) == 1)
-        before = merge(0, first - 1, size(body) == 1)
-        associate (of => block%of)
-            do l = 1, known
-                block%lane(l) = body(before + l)%lane
-                of%a(l) = body(before + l)%alpha
-                of%b(l) = body(before + l)%beta
-                of%g(l) = body(before + l)%gamma
-                of%first(l) = body(before + l)%a(1)
-                of%last(l) = body(before + l)%a(3)
-            end do
-            block%lane(known + 1:full) = block%lane(known)
-            of%a(known + 1:full) = of%a(known)
-            of%b(known + 1:full) = of%b(known)
-            of%g(known + 1:full) = of%g(known)
-            of%first(known + 1:full) = of%first(known)
-            of%last(known + 1:full) = of%last(known)
-        end associate
+        known = merge(count, 0, size(body) > 1)
+        do l = 1, known
+            lane(l) = body(first - 1 + l)%lane
+            of%a(l) = body(first - 1 + l)%alpha
+            of%b(l) = body(first - 1 + l)%beta
+            of%g(l) = body(first - 1 + l)%gamma
+            of%first(l) = body(first - 1 + l)%a(1)
+            of%last(l) = body(first - 1 + l)%a(3)
+        end do
+        last = min(size(body), first - 1 + count)
+        do l = known + 1, full
+            lane(l) = body(last)%lane
+            of%a(l) = body(last)%alpha
+            of%b(l) = body(last)%beta
+            of%g(l) = body(last)%gamma
+            of%first(l) = body(last)%a(1)
+            of%last(l) = body(last)%a(3)
+        end do
     end subroutine gather
 
     !> The constant rho of frb_flow_lanes as a polynomial in u and e to degree 4: coefficients of u to u^4, of
@@ -149,19 +154,20 @@ contains
                         + s23*(31/525.0_wp)
     end function polynomial_of_rho
 
-    !> What the shortest steps of n equal bodies need.
-    pure subroutine set_polynomial(body, n, t, of)
-        type(body_core), intent(in) :: body
-        integer, intent(in) :: n
-        real(wp), intent(in) :: t(n)
+    !> What the shortest steps of equal bodies need.
+    pure subroutine set_rho(of)
         type(lane_bodies), intent(inout) :: of
+        integer :: l
 
-        of%rho = polynomial_of_rho(body%a)
-        of%base(:n) = min(body%a(3), plain_largest)*t
-        of%above(:n, 1) = merge(0.0_wp, body%beta, body%lane < 0)*t
-        of%above(:n, 2) = body%alpha*t
-        of%above(:n, 3) = merge(body%beta, 0.0_wp, body%lane < 0)*t
-    end subroutine set_polynomial
+        of%rho = polynomial_of_rho(of%inverse)
+        do l = 1, of%full
+            of%base(l) = merge(of%first(l), of%last(l), of%odd)
+            of%above(l, 1) = merge(0.0_wp, of%b(l), of%odd)
+            of%above(l, 2) = merge(-of%g(l), of%a(l), of%odd)
+            of%above(l, 3) = merge(-of%b(l), 0.0_wp, of%odd)
+        end do
+        of%rho_known = .true.
+    end subroutine set_rho
 
     !> Times t, and with the axes in cyclic order, the middle moment second: of odd ones the first and the
     !> last change places. `plain_lanes` turn by no angle near overflow; the others get 0.
@@ -268,7 +274,7 @@ contains
     pure subroutine step_block(n, with_attitude, block, x1, x2, x3, work, all_moved)
         integer, intent(in) :: n
         logical, intent(in) :: with_attitude
-        type(block_of_bodies), intent(in) :: block
+        type(block_of_bodies), intent(inout) :: block
         real(wp), intent(in) :: x1(n), x2(n), x3(n)
         type(workspace), intent(inout) :: work
         logical, intent(out) :: all_moved
@@ -294,7 +300,7 @@ contains
     pure subroutine step_cyclic(n, with_attitude, of, x1, x2, x3, work, all_moved)
         integer, intent(in) :: n
         logical, intent(in) :: with_attitude
-        type(lane_bodies), intent(in) :: of
+        type(lane_bodies), intent(inout) :: of
         real(wp), intent(in) :: x1(n), x2(n), x3(n)
         type(workspace), intent(inout) :: work
         logical, intent(out) :: all_moved
@@ -339,10 +345,11 @@ contains
     pure subroutine step_class(class, n, with_attitude, of, x1, x2, x3, work)
         integer, intent(in) :: class, n
         logical, intent(in) :: with_attitude
-        type(lane_bodies), intent(in) :: of
+        type(lane_bodies), intent(inout) :: of
         real(wp), intent(in) :: x1(n), x2(n), x3(n)
         type(workspace), intent(inout) :: work
 
+        if (class == 1 .and. with_attitude .and. .not. of%rho_known) call set_rho(of)
         if (class == classes) then
             call step_long(n, with_attitude, of, x1, x2, x3, work)
         else

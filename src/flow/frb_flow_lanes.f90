@@ -46,10 +46,14 @@ module frb_flow_lanes
         real(wp) :: a(lanes), b(lanes), g(lanes)        !! alpha t, beta t, gamma t
         real(wp) :: ag(lanes), ab(lanes), bg(lanes)     !! their products
         real(wp) :: first(lanes), last(lanes)           !! a1 t, a3 t
-        real(wp) :: rate(lanes), base(lanes)            !! the larger and the smaller of them
-        real(wp) :: above(lanes, 3)                     !! a1 t, a2 t, a3 t less base
-        real(wp) :: rho(14)                             !! of equal bodies: polynomial_of_rho
-        logical :: alike                                !! the bodies are equal: the polynomial holds
+        real(wp) :: rate(lanes)                         !! the larger of them
+        logical :: alike                                !! the bodies are equal, all with these:
+        real(wp) :: inverse(3)                          !! a1, a2, a3 in descending order
+        logical :: odd                                  !! a3 t comes first
+        integer :: full                                 !! number of lanes
+        logical :: rho_known                            !! the rest, for tiny steps, is set
+        real(wp) :: base(lanes), above(lanes, 3)        !! the smaller of a1 t, a3 t; a1 t, a2 t, a3 t less it
+        real(wp) :: rho(14)                             !! polynomial_of_rho
     end type lane_bodies
 
     !> Numbers that one loop computes and another one uses.

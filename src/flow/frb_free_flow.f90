@@ -29,10 +29,11 @@ module frb_free_flow
     use frb_kinds, only: wp
     use frb_status, only: return_or_stop, status_ok, status_bad_attitude, status_bad_count
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+    use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc
     implicit none
     private
 
-    public :: rigid_body, free_flow, flow_tangent, core_of, cores_of, turn_matrix
+    public :: rigid_body, free_flow, flow_tangent, core_of, core_alone, cores_of, turn_matrix
 
     !> A rigid body: `body = rigid_body(moments)` or `body = rigid_body(tensor)`. Its components are private,
     !> so that all routines see the same body; the functions below read it.
@@ -207,6 +208,14 @@ contains
         cores => bodies%core
     end function cores_of
 
+    !> The core of one body as an array, in place: to copy it takes as long as a third of a step.
+    function core_alone(body) result(cores)
+        type(rigid_body), intent(in), target :: body
+        type(body_core), pointer :: cores(:)
+
+        call c_f_pointer(c_loc(body%core), cores, [1])
+    end function core_alone
+
     !> The constants of the body, for the other modules of the library.
     elemental function core_of(body) result(core)
         type(rigid_body), intent(in) :: body
@@ -307,24 +316,24 @@ contains
 
     !> Advances the momenta of n equal bodies.
     subroutine flow_momenta(body, h, m, stat)
-        type(rigid_body), intent(in) :: body
+        type(rigid_body), intent(in), target :: body
         real(wp), intent(in) :: h
         real(wp), intent(inout), contiguous :: m(:, :)      !! (3, n)
         integer, intent(out), optional :: stat
 
-        call flow_many([body%core], .true., [h], size(m, 2), m, stat)
+        call flow_many(core_alone(body), .true., [h], size(m, 2), m, stat)
     end subroutine flow_momenta
 
     !> Advances the momenta and attitudes of n equal bodies, in blocks that fill SIMD lanes. A body that is
     !> refused keeps its state and the others go on; `stat` then tells why (the largest code of several).
     subroutine flow_quaternions(body, h, m, q, stat)
-        type(rigid_body), intent(in) :: body
+        type(rigid_body), intent(in), target :: body
         real(wp), intent(in) :: h
         real(wp), intent(inout), contiguous :: m(:, :)      !! (3, n)
         real(wp), intent(inout), contiguous :: q(:, :)      !! (4, n)
         integer, intent(out), optional :: stat
 
-        call flow_many([body%core], .true., [h], size(m, 2), m, stat, q)
+        call flow_many(core_alone(body), .true., [h], size(m, 2), m, stat, q)
     end subroutine flow_quaternions
 
     !> Advances the momenta of the n bodies body(:).

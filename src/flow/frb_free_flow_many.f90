@@ -2,7 +2,7 @@
 !> `free_flow_columns` for states that are columns. Status, accuracy and threads as in frb_free_flow.
 module frb_free_flow_many
     use frb_flow_bodies, only: flow_many, flow_columns
-    use frb_free_flow, only: rigid_body, core_of, cores_of, turn_matrix
+    use frb_free_flow, only: rigid_body, core_alone, cores_of, turn_matrix
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
     use frb_status, only: return_or_stop, status_ok, status_bad_count
@@ -39,12 +39,12 @@ contains
 
     !> The momenta of n equal bodies, by the times h(n).
     subroutine momenta_of_body_at_times(body, h, m, stat)
-        type(rigid_body), intent(in) :: body
+        type(rigid_body), intent(in), target :: body
         real(wp), intent(in) :: h(:)
         real(wp), intent(inout), contiguous :: m(:, :)
         integer, intent(out), optional :: stat
 
-        call flow_many([core_of(body)], .true., h, size(h), m, stat)
+        call flow_many(core_alone(body), .true., h, size(h), m, stat)
     end subroutine momenta_of_body_at_times
 
     !> The momenta of the n bodies body(n), by the times h(n).
@@ -59,12 +59,12 @@ contains
 
     !> The momenta and quaternions of n equal bodies, by the times h(n).
     subroutine quaternions_of_body_at_times(body, h, m, q, stat)
-        type(rigid_body), intent(in) :: body
+        type(rigid_body), intent(in), target :: body
         real(wp), intent(in) :: h(:)
         real(wp), intent(inout), contiguous :: m(:, :), q(:, :)
         integer, intent(out), optional :: stat
 
-        call flow_many([core_of(body)], .true., h, size(h), m, stat, q)
+        call flow_many(core_alone(body), .true., h, size(h), m, stat, q)
     end subroutine quaternions_of_body_at_times
 
     !> The momenta and quaternions of the n bodies body(n), by the times h(n).
@@ -79,22 +79,22 @@ contains
 
     !> The momenta and matrices of n equal bodies, by h.
     subroutine matrices_of_body_at_time(body, h, m, a, stat)
-        type(rigid_body), intent(in) :: body
+        type(rigid_body), intent(in), target :: body
         real(wp), intent(in) :: h
         real(wp), intent(inout), contiguous :: m(:, :), a(:, :, :)
         integer, intent(out), optional :: stat
 
-        call matrices([core_of(body)], .true., [h], size(m, 2), m, a, stat)
+        call matrices(core_alone(body), .true., [h], size(m, 2), m, a, stat)
     end subroutine matrices_of_body_at_time
 
     !> The momenta and matrices of n equal bodies, by the times h(n).
     subroutine matrices_of_body_at_times(body, h, m, a, stat)
-        type(rigid_body), intent(in) :: body
+        type(rigid_body), intent(in), target :: body
         real(wp), intent(in) :: h(:)
         real(wp), intent(inout), contiguous :: m(:, :), a(:, :, :)
         integer, intent(out), optional :: stat
 
-        call matrices([core_of(body)], .true., h, size(h), m, a, stat)
+        call matrices(core_alone(body), .true., h, size(h), m, a, stat)
     end subroutine matrices_of_body_at_times
 
     !> The momenta and matrices of the n bodies body(n), by h.
@@ -119,27 +119,27 @@ contains
 
     !> The columns of n equal bodies, by h.
     subroutine columns_of_body_at_time(body, h, m1, m2, m3, q0, q1, q2, q3, stat)
-        type(rigid_body), intent(in) :: body
+        type(rigid_body), intent(in), target :: body
         real(wp), intent(in) :: h
         real(wp), intent(inout) :: m1(:), m2(:), m3(:)
         real(wp), intent(inout), optional :: q0(:), q1(:), q2(:), q3(:)
         integer, intent(out), optional :: stat
         integer :: code
 
-        call flow_columns([core_of(body)], .true., [h], size(m1), m1, m2, m3, code, q0, q1, q2, q3)
+        call flow_columns(core_alone(body), .true., [h], size(m1), m1, m2, m3, code, q0, q1, q2, q3)
         call return_or_stop(code, 'free_flow_columns', stat)
     end subroutine columns_of_body_at_time
 
     !> The columns of n equal bodies, by the times h(n).
     subroutine columns_of_body_at_times(body, h, m1, m2, m3, q0, q1, q2, q3, stat)
-        type(rigid_body), intent(in) :: body
+        type(rigid_body), intent(in), target :: body
         real(wp), intent(in) :: h(:)
         real(wp), intent(inout) :: m1(:), m2(:), m3(:)
         real(wp), intent(inout), optional :: q0(:), q1(:), q2(:), q3(:)
         integer, intent(out), optional :: stat
         integer :: code
 
-        call flow_columns([core_of(body)], .true., h, size(h), m1, m2, m3, code, q0, q1, q2, q3)
+        call flow_columns(core_alone(body), .true., h, size(h), m1, m2, m3, code, q0, q1, q2, q3)
         call return_or_stop(code, 'free_flow_columns', stat)
     end subroutine columns_of_body_at_times
 
