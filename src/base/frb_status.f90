@@ -1,11 +1,11 @@
 !> Errors as values: named status codes, and the one routine that hands a code to the caller or stops.
 !>
 !> Every public procedure that can refuse its input has a last, optional argument `stat`. Present, it
-!> receives one of the codes below and nothing is printed. Absent, a code other than `status_ok` ends the
-!> program by `error stop 1`, with exit code 1. Standard error then gets the line `routine: message`, and
-!> after it what the compiler writes at every `error stop`: gfortran writes `ERROR STOP 1` and the calls that
-!> led there (no calls when built with -fno-backtrace). Refused input leaves in-place arguments untouched and
-!> copies input to output elsewhere, so nothing is ever left unset.
+!> receives one of the codes below and nothing is printed. Absent, a code other than `status_ok` and
+!> `status_stopped` ends the program by `error stop 1`, with exit code 1. Standard error then gets the line
+!> `routine: message`, and after it what the compiler writes at every `error stop`: gfortran writes
+!> `ERROR STOP 1` and the calls that led there (no calls when built with -fno-backtrace). Refused input leaves
+!> in-place arguments untouched and copies input to output elsewhere, so nothing is ever left unset.
 module frb_status
     use, intrinsic :: iso_fortran_env, only: error_unit
     implicit none
@@ -43,7 +43,7 @@ contains
 
         if (present(stat)) then
             stat = code
-        else if (code /= status_ok) then
+        else if (code /= status_ok .and. code /= status_stopped) then
             write (error_unit, '(a)') place//': '//status_message(code)
             ! Before the compiler's own words, which do not wait in a buffer.
             flush (error_unit)

@@ -259,16 +259,6 @@ contains
         end do
     end subroutine turn_lanes
 
-    include 'middle_formulas.inc'
-
-    include 'middle_coefficients.inc'
-
-    include 'middle_third_kind.inc'
-
-    include 'long_formulas.inc'
-
-    include 'angle_formulas.inc'
-
-    include 'join_formulas.inc'
+    include 'all_doublings.inc'
 
 end module frb_flow_lanes_long

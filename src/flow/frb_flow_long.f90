@@ -200,6 +200,6 @@ contains
 
     include 'whole_periods.inc'
 
-    include 'all_doublings.inc'
+    include 'body_doublings.inc'
 
 end module frb_flow_long

@@ -306,17 +306,7 @@ contains
         end do
     end subroutine find_columns
 
-    include 'middle_formulas.inc'
-
-    include 'middle_coefficients.inc'
-
-    include 'middle_third_kind.inc'
-
-    include 'long_formulas.inc'
-
-    include 'angle_formulas.inc'
-
-    include 'join_formulas.inc'
+    include 'all_doublings.inc'
 
     include 'tangent_turn_formulas.inc'
 

@@ -283,7 +283,7 @@ contains
 
     include 'tangent_forms.inc'
 
-    include 'all_doublings.inc'
+    include 'body_doublings.inc'
 
     include 'tangent_formulas.inc'
 

@@ -121,8 +121,6 @@ contains
             if (present(t)) t = t_now
         end if
         if (present(report)) report = told
-        ! A stop by an observer is no error.
-        if (code == status_stopped .and. .not. present(stat)) return
         call return_or_stop(code, 'extrapolate', stat)
     end subroutine extrapolate_body
 

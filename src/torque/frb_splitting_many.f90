@@ -99,14 +99,8 @@ contains
                 rests(4:7, :) = run%q_rest
             end if
         end if
-        ! A stop by an observer is no error.
-        if (code == status_stopped .and. .not. present(stat)) return
         call return_or_stop(code, 'integrate', stat)
     end subroutine integrate_group
-
-    include 'next_time.inc'
-
-    include 'splitting_steps.inc'
 
     !> The torques, and whether they are finite and their kicks do not overflow.
     subroutine ask_torque(run, time, code)
@@ -315,5 +309,9 @@ contains
         end do
         code = status_ok
     end function check_group
+
+    include 'next_time.inc'
+
+    include 'splitting_steps.inc'
 
 end module frb_splitting_many

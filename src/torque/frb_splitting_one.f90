@@ -91,26 +91,8 @@ contains
             if (present(t)) t = time
             if (present(rests) .and. run%basis%compensated) rests = [run%m_rest, run%q_rest]
         end if
-        ! A stop by an observer is no error.
-        if (code == status_stopped .and. .not. present(stat)) return
         call return_or_stop(code, 'integrate', stat)
     end subroutine integrate_body
-
-    include 'next_time.inc'
-
-    include 'splitting_steps.inc'
-
-    !> The torque, and whether it is finite and its kicks do not overflow.
-    subroutine ask_torque(run, time, code)
-        type(moving), intent(inout) :: run
-        real(wp), intent(in) :: time
-        integer, intent(out) :: code
-
-        call run%scene%torque(run%q, time, run%tau, code)
-        if (code == status_ok) then
-            if (.not. all_within(3, run%tau, run%basis%largest_torque)) code = status_bad_torque
-        end if
-    end subroutine ask_torque
 
     !> m + amount tau + modified g.
     pure subroutine kick(run, amount, modified)
@@ -132,6 +114,18 @@ contains
             end if
         end if
     end subroutine kick
+
+    !> The torque, and whether it is finite and its kicks do not overflow.
+    subroutine ask_torque(run, time, code)
+        type(moving), intent(inout) :: run
+        real(wp), intent(in) :: time
+        integer, intent(out) :: code
+
+        call run%scene%torque(run%q, time, run%tau, code)
+        if (code == status_ok) then
+            if (.not. all_within(3, run%tau, run%basis%largest_torque)) code = status_bad_torque
+        end if
+    end subroutine ask_torque
 
     !> The torque, and the torque g of a modified kick, from the scene's own change of the torque or from
     !> displaced torques, for which a second agreement is needed. All torques are computed, whatever the code
@@ -242,5 +236,9 @@ contains
         run%m_rest = run%kept(8:10)
         run%q_rest = run%kept(11:14)
     end subroutine go_back
+
+    include 'next_time.inc'
+
+    include 'splitting_steps.inc'
 
 end module frb_splitting_one
