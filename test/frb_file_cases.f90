@@ -30,7 +30,8 @@ contains
         character(*), intent(in) :: content
         integer :: unit
 
-        open (newunit=unit, file=path, status='replace', access='stream', form='unformatted', action='write')
+        call remove_file(path)      ! a file that is written over is flushed to disk, which takes milliseconds
+        open (newunit=unit, file=path, status='new', access='stream', form='unformatted', action='write')
         write (unit) content
         close (unit)
     end subroutine write_text

@@ -118,8 +118,8 @@ tests_by_flang() {
     command -v flang-new-22 >/dev/null || [ "${FRB_CI_FULL:-}" = 1 ] || skipped "no flang-22"
     apt_package flang-new-22 flang-22
     library_and_tests_alone
-    local flags="-O0" brief=--brief
-    if [ "${FRB_CI_FULL:-}" = 1 ]; then flags=-O2 brief=; fi
+    local flags="-O0"
+    if [ "${FRB_CI_FULL:-}" = 1 ]; then flags=-O2; fi
     local code=0
     "$fpm" test --compiler flang-new-22 --flag "$flags" -- $brief >log 2>&1 || code=$?
     cat log

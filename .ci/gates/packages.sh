@@ -1,4 +1,4 @@
-# Packages of their own that use this one: test/packages/. Each says in its fpm.toml how it is run by hand.
+# Programs of their own that use this package: test/packages/. Each says in a file how it is run by hand.
 
 # In release; the programs of the README are a package in debug.
 dependent_package_runs() {
@@ -6,7 +6,11 @@ dependent_package_runs() {
     "$fpm" run --profile release
 }
 
-loop_allocates_nothing() { FPM=$fpm test/packages/allocations/count.sh; }
+loop_allocates_nothing() {
+    apt_package pkg-config pkg-config
+    prepare_clients
+    test/packages/allocations/count.sh
+}
 
 # Default kinds of twice the size, which a user's flags give to the library as well.
 default_kinds_do_not_matter() {

@@ -64,7 +64,8 @@ contains
             if (body_status == status_ok) body_status = body(i)%status()
         end do
         call check_run(body_status, scheme, h, nsteps, spacing, time, code, every, t)
-        if (code == status_ok) code = check_group(size(body), m, q, rests)
+        if (code == status_ok) code = check_group(size(body), m, q)
+        if (code == status_ok .and. present(rests)) code = check_rests(rests, size(m, 2))
         call scene%agree(code)
         if (code == status_ok) then
             n = size(m, 2)
@@ -284,10 +285,9 @@ contains
     end subroutine go_back
 
     !> Sizes and values of the state of a group.
-    pure function check_group(bodies, m, q, rests) result(code)
+    pure function check_group(bodies, m, q) result(code)
         integer, intent(in) :: bodies
         real(wp), intent(in) :: m(:, :), q(:, :)
-        real(wp), intent(in), optional :: rests(:, :)
         integer :: code
         integer :: n, i
 
@@ -295,20 +295,26 @@ contains
         code = status_bad_count
         if (size(m, 1) /= 3 .or. size(q, 1) /= 4 .or. size(q, 2) /= n) return
         if (bodies /= 1 .and. bodies /= n) return
-        if (present(rests)) then
-            if (size(rests, 1) /= 7 .or. size(rests, 2) /= n) return
-        end if
         code = status_bad_momentum
         if (.not. all(ieee_is_finite(m))) return
-        if (present(rests)) then
-            if (.not. all(ieee_is_finite(rests))) return
-        end if
         code = status_bad_attitude
         do i = 1, n
             if (.not. is_unit_quat(q(:, i))) return
         end do
         code = status_ok
     end function check_group
+
+    !> The same for the rounding errors of n bodies.
+    pure function check_rests(rests, n) result(code)
+        real(wp), intent(in) :: rests(:, :)
+        integer, intent(in) :: n
+        integer :: code
+
+        code = status_bad_count
+        if (size(rests, 1) /= 7 .or. size(rests, 2) /= n) return
+        code = status_bad_momentum
+        if (all(ieee_is_finite(rests))) code = status_ok
+    end function check_rests
 
     include 'next_time.inc'
 
