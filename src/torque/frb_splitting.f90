@@ -44,14 +44,14 @@ module frb_splitting
     !> For n bodies m is (3, n), q is (4, n), the body a scalar or body(n), scene and observer those of a
     !> group. `nsteps` is an integer of 32 or 64 bits; steps are counted in 64. Refused with `stat`, the state
     !> and t untouched: a body or scheme that could not be made (their own code); h zero, h or t not finite,
-    !> or nsteps*h beyond 1e301 (`status_bad_time`); nsteps < 0, every < 1 or sizes that differ
-    !> (`status_bad_count`); m not finite (`status_bad_momentum`); q not finite or its norm more than 1e-6 off
-    !> one (`status_bad_attitude`). The torque receives q with this norm, which the run keeps: it should be
-    !> one to the accuracy wanted. A run that ends early leaves m, q and t of the last whole step. It ends by
-    !> the code that a torque or drift returns; a torque that is not finite, or so large that m overflows
-    !> (`status_bad_torque`); an observer (`status_stopped`; without `stat` the call then returns, while every
-    !> other code stops the program). Where many processes share a scene, they agree upon the code first: see
-    !> `agree` in frb_torque.
+    !> nsteps*h or t beyond 1e301, or h beyond 1e100 with modified kicks (`status_bad_time`); nsteps < 0,
+    !> every < 1 or sizes that differ (`status_bad_count`); m not finite (`status_bad_momentum`); q not finite
+    !> or its norm more than 1e-6 off one (`status_bad_attitude`). The torque receives q with this norm, which
+    !> the run keeps: it should be one to the accuracy wanted. A run that ends early leaves m, q and t of the
+    !> last whole step. It ends by the code that a torque or drift returns; a torque that is not finite, or so
+    !> large that m overflows (`status_bad_torque`); an observer (`status_stopped`; without `stat` the call
+    !> then returns, while every other code stops the program). Where many processes share a scene, they agree
+    !> upon the code first: see `agree` in frb_torque.
     !>
     !> Exact restart: the state after a step depends on m, q, t and h before it only. A run that is stopped,
     !> by its observer or its number of steps, and continued from the returned m, q and t, ends with the same
