@@ -40,7 +40,7 @@ module frb_inertia
         real(c_double) :: parity = 1.0_wp             !! -1 when `order` is an odd permutation, else +1
         logical(c_bool) :: linear = .false.           !! a linear rotor
         logical(c_bool) :: needs_rotation = .false.   !! body axes are not principal, or the rotor is linear
-        real(c_double) :: axes_high(3, 3) = identity  !! columns: principal axes in body axes, their first 26
+        real(c_double) :: axes_high(3, 3) = identity  !! principal axes in body axes as columns, the first 26
                                                       !! bits
         real(c_double) :: axes_low(3, 3) = 0.0_wp     !! the rest: the sum is orthogonal to 1e-23
         real(c_double) :: axes_q(4) = no_turn         !! the same rotation as a quaternion, principal to body
