@@ -33,7 +33,7 @@ contains
     subroutine test_tangent_laws(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('tangent-laws', 46)
+        call t%open_suite('tangent-laws', 48)
         call check_identities(t)
         call check_group(t)
         call check_rest(t)
@@ -339,6 +339,7 @@ contains
         type(tally), intent(inout) :: t
         type(stream) :: random
         real(wp) :: moments(3), m0(3), m(3), q(4), m_free(3), q_free(4), h, phi(6, 6), by(6, 6), lambda, worst
+        real(wp) :: tensor(3, 3)
         integer :: i, k, nans, far
         logical :: halting
 
@@ -381,6 +382,24 @@ contains
             if (ieee_is_finite(phi(1, 1)) .neqv. 20*i <= 700) far = far + 1
         end do
         call t%equal('unstable-axis-overflows-where-it-must', far, 0)
+        ! A body by a tensor, almost a sphere: in its axes the derivative overflows in several elements.
+        nans = 0
+        far = 0
+        tensor = 0.0_wp
+        tensor(1, 1) = 0.41025388077387226_wp
+        tensor(2, 2) = 0.41025388077387220_wp
+        tensor(3, 3) = 0.41025388077387215_wp
+        tensor(2, 3) = -1.3877787807814457e-17_wp
+        tensor(3, 2) = tensor(2, 3)
+        do i = 10, 140, 10
+            m = [0.0_wp, 10.0_wp**i, 0.0_wp]
+            q = no_turn
+            call flow_tangent(rigid_body(tensor), 3.098_wp, m, q, phi, by_tensor=by)
+            if (any(ieee_is_nan(phi)) .or. any(ieee_is_nan(by))) nans = nans + 1
+            if (.not. ieee_is_finite(phi(1, 1))) far = far + 1
+        end do
+        call t%equal('by-a-tensor-no-derivative-is-nan', nans, 0)
+        call t%ok('by-a-tensor-derivatives-overflow', far >= 5)
         call ieee_set_halting_mode(ieee_overflow, halting)
     end subroutine check_extremes
 

@@ -12,10 +12,10 @@
 !> State, errors and extremes are those of free_flow, to which m and q agree to rounding. A refused step has
 !> the derivatives of no step: 1, and 0 by the inertia. Every orbit is covered: spheres and symmetric bodies,
 !> axes, the separatrix. Next to the unstable axis the derivative grows as exp(lambda h): entries beyond the
-!> largest number are Inf, none is NaN. Zero momentum: J = E = 1, W = h I^-1. Angles beyond 2^64 are cut, as
-!> in free_flow: the derivative is then that of the shorter time. A linear rotor has no momentum along its
-!> axis: derivatives by this component are 0. Of its derivatives by the moments only the sum of the columns of
-!> the two equal moments has a meaning.
+!> largest number are Inf, none is NaN (of a body by a tensor the sign of Inf has no meaning). Zero momentum:
+!> J = E = 1, W = h I^-1. Angles beyond 2^64 are cut, as in free_flow: the derivative is then that of the
+!> shorter time. A linear rotor has no momentum along its axis: derivatives by this component are 0. Of its
+!> derivatives by the moments only the sum of the columns of the two equal moments has a meaning.
 !>
 !> Accuracy: J, W and the derivatives by the inertia within 4 units (medians within 0.5) of their own inherent
 !> sensitivity, on 325 cases of data/reference and as many others; held by the suite `tangent`.

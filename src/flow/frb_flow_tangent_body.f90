@@ -228,13 +228,13 @@ contains
         c = 2*cross(change(2:4), old)
         if (code == status_ok) call turn_back(body, cross(change(2:4), c) - change(1)*c, change, m, q)
         transition(1:3, 1:3) = in_axes(axes, transition(1:3, 1:3))
-        transition(4:6, 1:3) = matmul(axes, matmul(transition(4:6, 1:3), transpose(axes)))
+        transition(4:6, 1:3) = product_of(axes, product_of(transition(4:6, 1:3), transpose(axes)))
         transition(4:6, 4:6) = in_axes(axes, transition(4:6, 4:6))
         if (body%linear) call drop_axis(body%axis, transition(:, 1:3))
         if (.not. present(by_inertia)) return
-        by_inertia(1:3, :) = matmul(axes, by_inertia(1:3, :))
-        by_inertia(4:6, :) = matmul(axes, by_inertia(4:6, :))
-        if (elements == 6) by_inertia = matmul(by_inertia, elements_in_axes(axes))
+        by_inertia(1:3, :) = product_of(axes, by_inertia(1:3, :))
+        by_inertia(4:6, :) = product_of(axes, by_inertia(4:6, :))
+        if (elements == 6) by_inertia = product_of(by_inertia, elements_in_axes(axes))
     end subroutine tangent_turned
 
     !> R x R^T for columns R of axes, that of 1 being 1: a matrix close to 1 is so to all digits.
@@ -247,11 +247,37 @@ contains
         do i = 1, 3
             y(i, i) = y(i, i) - 1
         end do
-        y = matmul(axes, matmul(y, transpose(axes)))
+        y = product_of(axes, product_of(y, transpose(axes)))
         do i = 1, 3
             y(i, i) = y(i, i) + 1
         end do
     end function in_axes
+
+    !> The product x y. With terms beyond the largest number a sum is the first of them, Inf: not NaN, the
+    !> difference of two. A product with 0 is 0.
+    pure function product_of(x, y) result(z)
+        real(wp), intent(in) :: x(:, :), y(:, :)
+        real(wp) :: z(size(x, 1), size(y, 2))
+        real(wp) :: term
+        integer :: i, j, k
+
+        if (all(ieee_is_finite(x)) .and. all(ieee_is_finite(y))) then
+            z = matmul(x, y)
+            return
+        end if
+        z = 0.0_wp
+        do j = 1, size(y, 2)
+            do k = 1, size(y, 1)
+                do i = 1, size(x, 1)
+                    if (.not. (abs(x(i, k)) > 0.0_wp .and. abs(y(k, j)) > 0.0_wp)) cycle
+                    term = x(i, k)*y(k, j)
+                    if (.not. ieee_is_finite(z(i, j))) cycle
+                    if (ieee_is_finite(term)) term = z(i, j) + term
+                    z(i, j) = term
+                end do
+            end do
+        end do
+    end function product_of
 
     !> Removes the derivative by the component of the momentum along an axis.
     pure subroutine drop_axis(axis, derivatives)
