@@ -22,11 +22,11 @@ contains
         call t%close_suite()
     end subroutine test_flow_splits
 
-    !> 2000 bodies of all sorts, short and long steps: the same bits in one call and in parts of any length,
+    !> 4200 bodies of all sorts, short and long steps: the same bits in one call and in parts of any length,
     !> for equal and different bodies, with and without attitude.
     subroutine check_splits(t)
         type(tally), intent(inout) :: t
-        integer, parameter :: n = 2000     ! enough for threads to share, in a build with OpenMP
+        integer, parameter :: n = 4200     ! from 4096 on threads share them, in a build with OpenMP
         type(stream) :: random
         type(rigid_body), allocatable :: bodies(:)
         real(wp), allocatable :: m(:, :), q(:, :), m1(:, :), q1(:, :)
