@@ -21,7 +21,7 @@ module frb_modified_kicks
     implicit none
     private
 
-    public :: angular_response, turned, gradient_torque
+    public :: angular_response, inverse_inertia, turned, gradient_torque
 
 contains
 
@@ -41,6 +41,16 @@ contains
             w(core%order) = core%a*v(core%order)
         end if
     end function angular_response
+
+    !> I^-1 in the body frame, as angular_response.
+    pure function inverse_inertia(core) result(response)
+        type(body_core), intent(in) :: core
+        real(wp) :: response(3, 3)
+
+        response(:, 1) = angular_response(core, [1.0_wp, 0.0_wp, 0.0_wp])
+        response(:, 2) = angular_response(core, [0.0_wp, 1.0_wp, 0.0_wp])
+        response(:, 3) = angular_response(core, [0.0_wp, 0.0_wp, 1.0_wp])
+    end function inverse_inertia
 
     !> The attitude turned about the vector v in the body by the angle 2 atan(|v|/2) instead of |v|: also an
     !> odd function of v, without a sine. If v overflows, q does not turn.

@@ -5,7 +5,7 @@ module frb_splitting_many
     use frb_free_flow, only: core_of, rigid_body
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
-    use frb_modified_kicks, only: angular_response, gradient_torque, turned
+    use frb_modified_kicks, only: inverse_inertia, turned
     use frb_rotations, only: cross, is_unit_quat
     use frb_schemes, only: splitting_scheme
     use frb_splitting_plan, only: splitting_plan, run_basis, new_basis, check_run
@@ -27,6 +27,7 @@ module frb_splitting_many
         real(wp), allocatable :: m_rest(:, :), q_rest(:, :), m_new(:, :), turn(:, :)
         real(wp), allocatable :: kept_m(:, :), kept_q(:, :), kept_m_rest(:, :), kept_q_rest(:, :)
         real(wp), allocatable :: n(:, :), g(:, :), other(:, :), q_turned(:, :)  ! see frb_modified_kicks
+        real(wp), allocatable :: response(:, :, :)              ! I^-1 of each core, body frame
         type(body_core), allocatable :: core(:)
         type(rigid_body), pointer :: body(:) => null()          !! n, or one for all
         class(group_scene), pointer :: scene => null()
@@ -90,6 +91,10 @@ contains
             if (present(drift)) run%drift => drift
             if (scheme%has_modified_kicks()) then
                 allocate (run%n(3, n), run%g(3, n), run%other(3, n), run%q_turned(4, n), source=0.0_wp)
+                allocate (run%response(3, 3, size(body)))
+                do i = 1, size(body)
+                    run%response(:, :, i) = inverse_inertia(run%core(i))
+                end do
             end if
             call run_steps(run, plan, h, nsteps, spacing, time, code)
             m = run%m
@@ -164,7 +169,7 @@ contains
         call run%scene%agree(code)
         if (code /= status_ok) return
         do i = 1, size(run%tau, 2)
-            run%n(:, i) = angular_response(run%core(min(i, size(run%core))), run%tau(:, i))
+            call respond(run%response(:, :, min(i, size(run%core))), run%tau(:, i), run%n(:, i))
         end do
         if (run%basis%displaced == 0) then
             call run%scene%torques_change(run%q, time, run%n, run%g, code)
@@ -199,12 +204,32 @@ contains
                 run%tau(:, i) = run%other(:, i) + cross(run%n(:, i), run%tau(:, i))
                 run%g(:, i) = 0.0_wp
             else
-                run%g(:, i) = gradient_torque(run%n(:, i), run%tau(:, i), run%g(:, i))
+                call add_curvature(run%n(:, i), run%tau(:, i), run%g(:, i))
             end if
         end do
         if (.not. (all_within(size(run%tau), run%tau, run%basis%largest_torque) &
                    .and. all_within(size(run%g), run%g, run%basis%largest_gradient))) code = status_bad_torque
     end subroutine finish_gradient
+
+    !> n = I^-1 tau, number by number and inlined: calls that return arrays would double the time of a stage.
+    pure subroutine respond(response, tau, n)
+        real(wp), intent(in) :: response(3, 3), tau(3)
+        real(wp), intent(inout) :: n(3)
+
+        n(1) = response(1, 1)*tau(1) + response(1, 2)*tau(2) + response(1, 3)*tau(3)
+        n(2) = response(2, 1)*tau(1) + response(2, 2)*tau(2) + response(2, 3)*tau(3)
+        n(3) = response(3, 1)*tau(1) + response(3, 2)*tau(2) + response(3, 3)*tau(3)
+    end subroutine respond
+
+    !> g, which comes as the change of the torque, as by gradient_torque; inlined too.
+    pure subroutine add_curvature(n, tau, g)
+        real(wp), intent(in) :: n(3), tau(3)
+        real(wp), intent(inout) :: g(3)
+
+        g(1) = 2*(g(1) + (n(2)*tau(3) - n(3)*tau(2)))
+        g(2) = 2*(g(2) + (n(3)*tau(1) - n(1)*tau(3)))
+        g(3) = 2*(g(3) + (n(1)*tau(2) - n(2)*tau(1)))
+    end subroutine add_curvature
 
     !> The attitudes turned by `amount` times n.
     pure subroutine turn_all(run, amount)

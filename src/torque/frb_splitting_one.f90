@@ -5,7 +5,7 @@ module frb_splitting_one
     use frb_free_flow, only: core_of, rigid_body
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
-    use frb_modified_kicks, only: angular_response, gradient_torque, turned
+    use frb_modified_kicks, only: gradient_torque, inverse_inertia, turned
     use frb_rotations, only: cross, is_unit_quat
     use frb_schemes, only: splitting_scheme
     use frb_splitting_plan, only: splitting_plan, run_basis, new_basis, check_run
@@ -176,16 +176,6 @@ contains
         end if
         call run%scene%agree(code)
     end subroutine check_torque_and_gradient
-
-    !> I^-1 in the body frame, as angular_response.
-    pure function inverse_inertia(core) result(response)
-        type(body_core), intent(in) :: core
-        real(wp) :: response(3, 3)
-
-        response(:, 1) = angular_response(core, [1.0_wp, 0.0_wp, 0.0_wp])
-        response(:, 2) = angular_response(core, [0.0_wp, 1.0_wp, 0.0_wp])
-        response(:, 3) = angular_response(core, [0.0_wp, 0.0_wp, 1.0_wp])
-    end function inverse_inertia
 
     !> The free body for a time h.
     subroutine advance(run, h, code)
