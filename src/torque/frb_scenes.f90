@@ -122,7 +122,7 @@ contains
 
     !> tau = u x c and g = 2 (D_n tau + n x tau) = 2 u x (n x c), c the centre. n x c = (I^-1 (u x c)) x c is
     !> linear in u: its matrix does not wait for u. A centre on the third axis leaves few products, and a
-    !> modified kick then costs 1 ns more than a plain one instead of 5.
+    !> modified kick then costs 2 ns more than a plain one instead of 5.
     subroutine heavy_top_torque_and_gradient(self, q, t, response, tau, g, stat)
         class(heavy_top), intent(inout) :: self
         real(wp), intent(in) :: q(4), t, response(3, 3)
