@@ -25,7 +25,7 @@ module frb_free_flow_many
     end interface free_flow
 
     !> `call free_flow_columns(body, h, m1, m2, m3 [, q0, q1, q2, q3] [, stat])`: body or body(n), h or h(n),
-    !> all others (n); the q all or none. No state is copied: the fastest way.
+    !> all others (n); the q all or none. Contiguous vectors are not copied: the fastest way.
     interface free_flow_columns
         module procedure columns_of_body_at_time
         module procedure columns_of_body_at_times
