@@ -138,25 +138,13 @@ contains
         spoilt = .true.
         do i = 1, 60
             one = shared_top(top=item%top, refuse_at=i)
-            m = item%m0
-            q = item%q0
-            call extrapolate(item%body, one, 2.0_wp, m, q, 1.0e-9_wp, stat=stat)
-            other = shared_top(top=item%top, others_refuse_at=one%said_at)
-            m_other = item%m0
-            q_other = item%q0
-            call extrapolate(item%body, other, 2.0_wp, m_other, q_other, 1.0e-9_wp, stat=stat_other)
+            call run_both()
             ! The second torque only serves the first guess of a step.
             refused = refused .and. stat == merge(status_ok, own_code, i == 2) .and. stat_other == stat &
                       .and. one%said_at > 0 &
                       .and. one%asked == other%asked .and. one%agreed == other%agreed
             one = shared_top(top=item%top, spoil_at=i)
-            m = item%m0
-            q = item%q0
-            call extrapolate(item%body, one, 2.0_wp, m, q, 1.0e-9_wp, stat=stat)
-            other = shared_top(top=item%top, others_refuse_at=one%said_at)
-            m_other = item%m0
-            q_other = item%q0
-            call extrapolate(item%body, other, 2.0_wp, m_other, q_other, 1.0e-9_wp, stat=stat_other)
+            call run_both()
             spoilt = spoilt .and. one%said_at > 0 .and. one%asked == other%asked &
                      .and. one%agreed == other%agreed &
                      .and. (stat == status_ok .eqv. stat_other == status_ok) &
@@ -164,6 +152,20 @@ contains
         end do
         call t%ok('processes-that-extrapolate-end-together-where-one-refuses', refused)
         call t%ok('processes-that-extrapolate-stay-together-where-one-has-nan', spoilt)
+
+    contains
+
+        !> The run of the first process, and that of the second, which hears of what the first one said.
+        subroutine run_both()
+            m = item%m0
+            q = item%q0
+            call extrapolate(item%body, one, 2.0_wp, m, q, 1.0e-9_wp, stat=stat)
+            other = shared_top(top=item%top, others_refuse_at=one%said_at)
+            m_other = item%m0
+            q_other = item%q0
+            call extrapolate(item%body, other, 2.0_wp, m_other, q_other, 1.0e-9_wp, stat=stat_other)
+        end subroutine run_both
+
     end subroutine test_extrapolate
 
     !> The hook gets every code before it takes effect, and the code that it returns ends the run.

@@ -133,10 +133,7 @@ contains
             q2 = b2(l)
             q3 = b3(l)
             call turn(it%w0(l), u1, of%side(l)*it%w2(l), u3, q0, q1, q2, q3)
-            a0(4*l - 3) = q0
-            a1(4*l - 3) = q1
-            a2(4*l - 3) = q2
-            a3(4*l - 3) = q3
+            include 'put_attitude.inc'
         end do
     end subroutine set_attitudes
 

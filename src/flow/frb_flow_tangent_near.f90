@@ -273,10 +273,7 @@ contains
             q2 = b2(l)
             q3 = b3(l)
             call turn(w0, y1 + w0*y1, y2 + w0*y2, y3 + w0*y3, q0, q1, q2, q3)
-            a0(4*l - 3) = q0
-            a1(4*l - 3) = q1
-            a2(4*l - 3) = q2
-            a3(4*l - 3) = q3
+            include 'put_attitude.inc'
         end do
     end subroutine set_attitudes
 
