@@ -1,7 +1,7 @@
 !> Derivatives of many steps: products of transitions, runs under torque, a motion at a time.
 module frb_test_tangent_runs
-    use frb_checks, only: tally, largest
-    use frb_flow_samples, only: no_turn, no_rotation
+    use frb_checks, only: tally, largest, worst_of
+    use frb_flow_samples, only: stream, not_a_number, same_bits, no_turn, no_rotation
     use frb_free_flow, only: flow_tangent, rigid_body
     use frb_free_motion, only: free_motion
     use frb_kinds, only: wp
@@ -20,14 +20,20 @@ module frb_test_tangent_runs
     public :: test_tangent_runs
 
     real(wp), parameter :: eps = epsilon(1.0_wp)
+    !> Two roundings of a step of a few radians; measured: 6 eps at most, on 1.6 million steps.
+    real(wp), parameter :: lane_bar = 16*eps
 
 contains
 
     subroutine test_tangent_runs(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('tangent-runs', 18)
+        call t%open_suite('tangent-runs', 28)
         call check_composition(t)
+        call check_composition_in_lanes(t, '0.01', 0.01_wp, 1.0e-14_wp)
+        call check_composition_in_lanes(t, '0.1', 0.1_wp, 5.0e-14_wp)
+        call check_lengths_in_lanes(t)
+        call check_mixed_lanes(t)
         call check_runs(t)
         call check_almost_aligned(t)
         call t%close_suite()
@@ -73,6 +79,131 @@ contains
         call flow_tangent(body, 1000.0_wp, m, q, phi)
         call t%at_most('1e5-steps-are-one', norm2(product - phi)/norm2(phi), 1.0e-11_wp)
     end subroutine check_composition
+
+    !> The symplectic structure after 1e5 steps of h, in lanes. A rounding that all steps of a motion share
+    !> shows here: with the triple rounded before its use, 2e-13 for steps of 0.1.
+    subroutine check_composition_in_lanes(t, name, h, bar)
+        type(tally), intent(inout) :: t
+        character(*), intent(in) :: name
+        real(wp), intent(in) :: h, bar
+        integer, parameter :: n = 32, followed(3) = [1, 14, 32]
+        type(stream) :: random
+        type(rigid_body) :: body
+        real(wp) :: m0(3, n), m(3, n), q(4, n), phi(6, 6, n), product(6, 6, size(followed)), identity(6, 6)
+        real(wp) :: residual
+        integer :: step, i, k
+
+        body = rigid_body([0.6_wp, 0.8_wp, 1.0_wp])
+        do i = 1, n
+            m0(:, i) = random%direction()
+            q(:, i) = no_turn
+        end do
+        m = m0
+        identity = 0.0_wp
+        do i = 1, 6
+            identity(i, i) = 1.0_wp
+        end do
+        product = spread(identity, 3, size(followed))
+        do step = 1, t%many(100000)
+            call flow_tangent(body, h, m, q, phi)
+            do k = 1, size(followed)
+                product(:, :, k) = product(:, :, k) &
+                                   + matmul(phi(:, :, followed(k)) - identity, product(:, :, k))
+            end do
+        end do
+        residual = 0.0_wp
+        do k = 1, size(followed)
+            i = followed(k)
+            residual = worst_of(residual, norm2(matmul(transpose(product(:, :, k)), &
+                                                       matmul(structure(m(:, i)), product(:, :, k))) &
+                                                - structure(m0(:, i)))/norm2(product(:, :, k))**2)
+        end do
+        call t%at_most('symplectic-after-1e5-steps-in-lanes-of-'//name, residual, bar)
+    end subroutine check_composition_in_lanes
+
+    !> Lanes against one body at a time, for steps of all lengths: from the first terms of the series to many
+    !> doublings.
+    subroutine check_lengths_in_lanes(t)
+        type(tally), intent(inout) :: t
+        integer, parameter :: n = 32, lengths = 120
+        type(stream) :: random
+        type(rigid_body) :: body
+        real(wp) :: h, moments(3), m0(3), q0(4), m(3, n), q(4, n), phi(6, 6, n), m1(3), q1(4), phi1(6, 6)
+        real(wp) :: worst(4)
+        integer :: i, k
+
+        worst = 0.0_wp
+        do k = 1, lengths
+            moments = random%triangle()
+            body = rigid_body(cshift(moments, mod(k, 3)))
+            h = minval(moments)*10.0_wp**(-3 + 4.0_wp*k/lengths)
+            do i = 1, n
+                m(:, i) = random%direction()
+                q(:, i) = no_turn
+            end do
+            m0 = m(:, 7)
+            q0 = q(:, 7)
+            call flow_tangent(body, h, m, q, phi)
+            m1 = m0
+            q1 = q0
+            call flow_tangent(body, h, m1, q1, phi1)
+            worst = worst_of(worst, [norm2(m(:, 7) - m1), norm2(q(:, 7) - q1), &
+                                     norm2(phi(1:3, 1:3, 7) - phi1(1:3, 1:3))/norm2(phi1(1:3, 1:3)), &
+                                     norm2(phi(4:6, 1:3, 7) - phi1(4:6, 1:3))/norm2(phi1(4:6, 1:3))])
+        end do
+        call t%at_most('momentum-in-lanes-is-that-of-one-body', worst(1), lane_bar)
+        call t%at_most('attitude-in-lanes-is-that-of-one-body', worst(2), lane_bar)
+        call t%at_most('J-in-lanes-is-that-of-one-body', worst(3), lane_bar)
+        call t%at_most('W-in-lanes-is-that-of-one-body', worst(4), lane_bar)
+    end subroutine check_lengths_in_lanes
+
+    !> Bodies whose steps differ in length, some of them refused, against one body at a time.
+    subroutine check_mixed_lanes(t)
+        type(tally), intent(inout) :: t
+        integer, parameter :: numbers(4) = [33, 64, 100, 1061]
+        type(stream) :: random
+        type(rigid_body) :: body
+        real(wp), allocatable :: m(:, :), q(:, :), m0(:, :), q0(:, :), phi(:, :, :)
+        real(wp) :: phi1(6, 6), worst(3)
+        integer :: i, k, stat, code, expected
+        logical :: agree
+
+        worst = 0.0_wp
+        agree = .true.
+        body = rigid_body([0.6_wp, 1.0_wp, 0.8_wp])
+        do k = 1, size(numbers)
+            allocate (m(3, numbers(k)), q(4, numbers(k)), phi(6, 6, numbers(k)))
+            do i = 1, numbers(k)
+                m(:, i) = random%log_uniform(-2.0_wp, 1.0_wp)*random%direction()
+                q(:, i) = [random%uniform(-1.0_wp, 1.0_wp), random%direction()]
+                if (mod(i, 40) == 7) m(2, i) = not_a_number(i)
+                if (mod(i, 40) == 8) q(:, i) = 0.0_wp
+                if (mod(i, 40) == 9) m(:, i) = 0.0_wp
+            end do
+            m0 = m
+            q0 = q
+            call flow_tangent(body, 0.1_wp, m, q, phi, stat)
+            expected = 0
+            do i = 1, numbers(k)
+                call flow_tangent(body, 0.1_wp, m0(:, i), q0(:, i), phi1, code)
+                expected = max(expected, code)
+                if (any(mod(i, 40) == [7, 8])) then
+                    agree = agree .and. all(abs(phi(:, :, i) - phi1) <= 0.0_wp) &
+                            .and. same_bits(m(:, i), m0(:, i)) .and. same_bits(q(:, i), q0(:, i))
+                else
+                    worst = worst_of(worst, [norm2(m(:, i) - m0(:, i))/max(norm2(m0(:, i)), 0.01_wp), &
+                                             norm2(q(:, i) - q0(:, i))/norm2(q0(:, i)), &
+                                             norm2(phi(:, :, i) - phi1)/norm2(phi1)])
+                end if
+            end do
+            agree = agree .and. stat == expected
+            deallocate (m, q, phi)
+        end do
+        call t%at_most('momenta-of-mixed-lanes-are-those-of-one-body', worst(1), lane_bar)
+        call t%at_most('attitudes-of-mixed-lanes-are-those-of-one-body', worst(2), lane_bar)
+        call t%at_most('derivatives-in-mixed-lanes-are-those-of-one-body', worst(3), lane_bar)
+        call t%ok('refused-bodies-in-mixed-lanes-stay', agree)
+    end subroutine check_mixed_lanes
 
     !> Nearly principal axes: the rotation to principal axes changes the momentum by less than its rounding.
     !> |m| wanders and does not drift. See the suite `drifts`.

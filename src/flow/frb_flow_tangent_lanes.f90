@@ -7,23 +7,24 @@
 !> goes into these stores; to gather a body's numbers first and to copy them takes longer (AVX2).
 module frb_flow_tangent_lanes
     use frb_flow_lanes, only: limits, angle_as_size
-    use frb_flow_limits, only: short_limit, small_turn_limit, period_limit, sin_cos_limit, plain_largest, &
-        plain_smallest
+    use frb_flow_limits, only: short_limit, middle_limit, small_turn_limit, middle_turn_limit, period_limit, &
+        sin_cos_limit, plain_largest, plain_smallest
     use frb_kinds, only: wp
     use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
     use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
-    public :: lanes, of_m, of_q, of_phi, kinds, tiny, far, lane_body, lane_orbits, load_lanes, keep_lanes
+    public :: lanes, of_m, of_q, of_phi, kinds, tiny, short, middle, far
+    public :: lane_body, lane_orbits, load_lanes, keep_lanes
 
     integer, parameter :: lanes = 32    !! bodies in a block
     !> From one component of m, of q, of transition in the first lane of a block to that in the last.
     integer, parameter :: of_m = 3*lanes - 2, of_q = 4*lanes - 3, of_phi = 36*lanes - 35
 
-    !> The kinds of steps: by the first terms of series, by series, by doublings, or not in lanes.
-    integer, parameter :: tiny = 1, near = 2, far = 3, kinds = 3
-    real(wp), parameter :: no_lane = 4.0_wp
+    !> The kinds of steps: by the first terms of series, by short or middle series, by doublings.
+    integer, parameter :: tiny = 1, short = 2, middle = 3, far = 4, kinds = 4
+    real(wp), parameter :: no_lane = 5.0_wp     !! not in lanes
 
     !> The body in axes of cyclic order, the middle moment second, times t = h/2. Where the moments ascend in
     !> an odd order, these axes have them descend, and a, b, g are negative.
@@ -35,7 +36,7 @@ module frb_flow_tangent_lanes
         real(wp) :: rho(14)         !! polynomial_of_rho
     end type lane_body
 
-    !> The orbits of a block. A lane whose step is not served stands still.
+    !> The orbits of a block.
     type :: lane_orbits
         real(wp) :: kind(lanes)
         real(wp) :: m1(lanes), m2(lanes), m3(lanes)     !! momentum in cyclic axes
@@ -99,8 +100,9 @@ contains
         type(lane_orbits), intent(inout) :: it
         integer, intent(out) :: many(kinds)
         real(wp) :: n1, n2, n3, ab, ag, bg, k, p, r, gg, largest, square, kind
-        real(wp) :: most_tiny, most_near        !! largest squares of a half angle of the series
-        integer(int64) :: firsts, series, doublings
+        real(wp) :: most(tiny:middle)           !! largest squares of a half angle of the series
+        real(wp), parameter :: of_triple(tiny:middle) = [limits(1), short_limit, middle_limit]
+        integer(int64) :: to_tiny, to_short, to_middle, to_far      !! lanes up to each kind
         integer :: l
 
         ab = body%a*body%b
@@ -110,13 +112,14 @@ contains
         ! By |m| alone, p and r being at most |m|^2 times the larger of bg and ab: so bodies with momenta of
         ! one size are of one kind, and their blocks need only one.
         k = max(ab, bg)
-        most_tiny = limits(1)/angle_as_size
-        if (most_tiny*k > limits(1)*largest) most_tiny = limits(1)*largest/k
-        most_near = small_turn_limit
-        if (small_turn_limit*k > short_limit*largest) most_near = short_limit*largest/k
-        firsts = 0
-        series = 0
-        doublings = 0
+        most = [limits(1)/angle_as_size, small_turn_limit, middle_turn_limit]
+        do l = tiny, middle
+            if (most(l)*k > of_triple(l)*largest) most(l) = of_triple(l)*largest/k
+        end do
+        to_tiny = 0
+        to_short = 0
+        to_middle = 0
+        to_far = 0
         do l = 1, lanes
             n1 = x1(l)
             n2 = x2(l)
@@ -128,8 +131,9 @@ contains
             square = largest*gg             ! of the largest half angle
             kind = merge(real(far, wp), no_lane, max(p, r) <= period_limit)
             kind = merge(kind, no_lane, square <= sin_cos_limit**2)
-            kind = merge(real(near, wp), kind, square <= most_near)
-            kind = merge(real(tiny, wp), kind, square <= most_tiny)
+            kind = merge(real(middle, wp), kind, square <= most(middle))
+            kind = merge(real(short, wp), kind, square <= most(short))
+            kind = merge(real(tiny, wp), kind, square <= most(tiny))
             kind = merge(kind, no_lane, gg > 0.0_wp)
             it%kind(l) = kind
             it%m1(l) = n1
@@ -137,28 +141,26 @@ contains
             it%m3(l) = n3
             it%p(l) = p
             it%r(l) = r
-            firsts = firsts + merge(1_int64, 0_int64, kind <= tiny)
-            series = series + merge(1_int64, 0_int64, kind <= near)
-            doublings = doublings + merge(1_int64, 0_int64, kind <= far)
+            to_tiny = to_tiny + merge(1_int64, 0_int64, kind <= tiny)
+            to_short = to_short + merge(1_int64, 0_int64, kind <= short)
+            to_middle = to_middle + merge(1_int64, 0_int64, kind <= middle)
+            to_far = to_far + merge(1_int64, 0_int64, kind <= far)
         end do
-        many = int([firsts, series - firsts, doublings - series])
+        many = int([to_tiny, to_short - to_tiny, to_middle - to_short, to_far - to_middle])
     end subroutine find_reach
 
-    !> The lanes of a kind; the others stand still.
-    pure subroutine keep_lanes(kind, it, kept, here)
+    !> The lanes of other kinds stand still, their momenta become 0.
+    pure subroutine keep_lanes(kind, it)
         integer, intent(in) :: kind
-        type(lane_orbits), intent(in) :: it
-        type(lane_orbits), intent(inout) :: kept
-        logical, intent(out) :: here(lanes)
+        type(lane_orbits), intent(inout) :: it
+        real(wp) :: factor(lanes)
 
-        here = abs(it%kind - kind) <= 0
-        kept%kind = it%kind
-        kept%m1 = merge(it%m1, 0.0_wp, here)
-        kept%m2 = merge(it%m2, 0.0_wp, here)
-        kept%m3 = merge(it%m3, 0.0_wp, here)
-        kept%p = merge(it%p, 0.0_wp, here)
-        kept%r = merge(it%r, 0.0_wp, here)
-        kept%q = it%q
+        factor = merge(1.0_wp, 0.0_wp, nint(it%kind) == kind)
+        it%m1 = factor*it%m1
+        it%m2 = factor*it%m2
+        it%m3 = factor*it%m3
+        it%p = factor*it%p
+        it%r = factor*it%r
     end subroutine keep_lanes
 
 end module frb_flow_tangent_lanes

@@ -5,8 +5,7 @@ module frb_flow_tangent_many
     use frb_flow_limits, only: plain_largest
     use frb_flow_tangent_body, only: tangent_body
     use frb_flow_tangent_far, only: step_far
-    use frb_flow_tangent_lanes, only: lanes, kinds, tiny, far, lane_body, lane_orbits, load_lanes, &
-        keep_lanes
+    use frb_flow_tangent_lanes, only: lanes, kinds, far, lane_body, lane_orbits, load_lanes, keep_lanes
     use frb_flow_tangent_near, only: step_near
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
@@ -17,42 +16,49 @@ module frb_flow_tangent_many
 
     public :: tangent_many
 
+    integer, parameter :: group = 32*lanes      !! bodies that a thread takes at a time
+    integer, parameter :: few = lanes/4         !! as many are faster one by one
+
+    !> Bodies that wait, and their states, by kind of step; those of kind `kinds` + 1 are moved one by one.
+    type :: waiting_states
+        integer :: count(kinds + 1), number(lanes, kinds + 1)
+        real(wp) :: m(3, lanes, kinds + 1), q(4, lanes, kinds + 1)
+    end type waiting_states
+
 contains
 
     !> Advances n equal bodies by h, with their transitions. A body that is refused keeps its state, and its
-    !> transition is that of no step; code is then the largest of the codes. With -fopenmp blocks are shared
-    !> among the threads.
+    !> transition is that of no step; code is then the largest of the codes. With -fopenmp groups of bodies
+    !> are shared among the threads.
     subroutine tangent_many(body, h, n, m, q, transition, code)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: h
         integer, intent(in) :: n
         real(wp), intent(inout) :: m(3, n), q(4, n)
-        real(wp), intent(out) :: transition(6, 6, n)
+        real(wp), intent(out) :: transition(36, n)
         integer, intent(out) :: code
         type(lane_body) :: of
-        logical :: in_lanes, whole, served(lanes)
-        integer :: first, i, count, one, refused
+        logical :: in_lanes
+        integer :: first, i, one, refused
 
         refused = status_ok
         in_lanes = body%status == status_ok .and. .not. body%needs_rotation .and. is_plain_time(body, h)
-        if (in_lanes) of = body_of_lanes(body, 0.5_wp*h)
-        !$omp parallel do if (n >= 64*lanes) private(whole, served, i, count, one) reduction(max: refused)
-        do first = 1, n, lanes
-            count = min(lanes, n - first + 1)
-            whole = .false.
-            if (in_lanes .and. count > lanes/4) then
-                call step_block(of, count, m(1, first), q(1, first), transition(1, 1, first), whole, served)
-            else
-                served = .false.
-            end if
-            if (whole) cycle
-            do i = first, first + count - 1
-                if (served(i - first + 1)) cycle
-                call tangent_body(body, h, m(:, i), one, 0, q(:, i), transition(:, :, i))
+        if (in_lanes) then
+            of = body_of_lanes(body, 0.5_wp*h)
+            !$omp parallel do if (n >= 2*group) reduction(max: refused)
+            do first = 1, n, group
+                call step_group(body, h, of, min(group, n - first + 1), m(1, first), q(1, first), &
+                                transition(1, first), refused)
+            end do
+            !$omp end parallel do
+        else
+            !$omp parallel do if (n >= 2*group) private(one) reduction(max: refused)
+            do i = 1, n
+                call tangent_body(body, h, m(1, i), one, 0, q(1, i), transition(1, i))
                 refused = max(refused, one)
             end do
-        end do
-        !$omp end parallel do
+            !$omp end parallel do
+        end if
         code = refused
     end subroutine tangent_many
 
@@ -81,61 +87,104 @@ contains
         end if
     end function body_of_lanes
 
-    !> Advances those of a block that the lanes serve; the others are left as they are.
-    pure subroutine step_block(of, count, m, q, transition, whole, served)
+    !> Advances a group of bodies. Of a block that needs steps of several kinds, those of the kind that most
+    !> have are advanced, if they are half of it; the others wait, with a copy of their state, for others of
+    !> their kind. So do the bodies of a last block that is not whole; few of them are advanced one by one.
+    pure subroutine step_group(body, h, of, n, m, q, transition, refused)
+        type(body_core), intent(in) :: body
+        real(wp), intent(in) :: h
         type(lane_body), intent(in) :: of
-        integer, intent(in) :: count
-        real(wp), intent(inout) :: m(3, count), q(4, count), transition(36, count)
-        logical, intent(out) :: whole               !! all are served; served is then not set
-        logical, intent(inout) :: served(lanes)
-        real(wp) :: some_m(3, lanes), some_q(4, lanes)
+        integer, intent(in) :: n
+        real(wp), intent(inout) :: m(3, n), q(4, n), transition(36, n)
+        integer, intent(inout) :: refused
+        type(waiting_states) :: waiting
         type(lane_orbits) :: orbits
-        integer :: l, kind, many(kinds)
+        real(wp) :: old_m(3, lanes), old_q(4, lanes)
+        integer :: first, l, one, most, kind, many(kinds)
 
-        if (count == lanes) then
-            call load_lanes(of, m, q, orbits, many)
-            whole = maxval(many) == lanes
-            if (whole) then
-                call step_lanes(maxloc(many, 1), of, orbits, m, q, transition)
-                return
+        waiting%count = 0
+        do first = 1, n, lanes
+            most = 0
+            if (n - first < few) then
+                do l = first, n
+                    call tangent_body(body, h, m(1, l), one, 0, q(1, l), transition(1, l))
+                    refused = max(refused, one)
+                end do
+                exit
+            else if (n - first >= lanes - 1) then
+                call load_lanes(of, m(1, first), q(1, first), orbits, many)
+                most = maxloc(many, 1)
+                if (many(most) == lanes) then
+                    call step_lanes(most, of, orbits, m(1, first), q(1, first), transition(1, first))
+                    cycle
+                end if
+                if (2*many(most) < lanes) most = 0
             end if
-        else
             do l = 1, lanes
-                some_m(:, l) = m(:, min(l, count))
-                some_q(:, l) = q(:, min(l, count))
+                old_m(:, l) = m(:, first + min(l - 1, n - first))
+                old_q(:, l) = q(:, first + min(l - 1, n - first))
             end do
-            call load_lanes(of, some_m, some_q, orbits, many)
-        end if
-        whole = .false.
-        served = .false.
-        do kind = 1, kinds
-            if (many(kind) > 0) call step_some(kind, of, orbits, count, m, q, transition, served)
+            if (n - first < lanes - 1) call load_lanes(of, old_m, old_q, orbits, many)
+            if (most > 0) then
+                call keep_lanes(most, orbits)
+                call step_lanes(most, of, orbits, m(1, first), q(1, first), transition(1, first))
+            end if
+            do l = 1, min(lanes, n - first + 1)
+                kind = min(nint(orbits%kind(l)), kinds + 1)
+                if (kind == most) cycle
+                associate (count => waiting%count(kind))
+                    count = count + 1
+                    waiting%number(count, kind) = first - 1 + l
+                    waiting%m(:, count, kind) = old_m(:, l)
+                    waiting%q(:, count, kind) = old_q(:, l)
+                    if (count == lanes) call step_kind(body, h, of, kind, waiting, n, m, q, transition, &
+                                                       refused)
+                end associate
+            end do
         end do
-    end subroutine step_block
+        do kind = 1, kinds + 1
+            call step_kind(body, h, of, kind, waiting, n, m, q, transition, refused)
+        end do
+    end subroutine step_group
 
-    !> Advances the lanes of one kind.
-    pure subroutine step_some(kind, of, orbits, count, m, q, transition, served)
-        integer, intent(in) :: kind
+    !> Advances the bodies of one kind that wait.
+    pure subroutine step_kind(body, h, of, kind, waiting, n, m, q, transition, refused)
+        type(body_core), intent(in) :: body
+        real(wp), intent(in) :: h
         type(lane_body), intent(in) :: of
-        type(lane_orbits), intent(in) :: orbits
-        integer, intent(in) :: count
-        real(wp), intent(inout) :: m(3, count), q(4, count), transition(36, count)
-        logical, intent(inout) :: served(lanes)
-        type(lane_orbits) :: kept
-        real(wp) :: some_m(3, lanes), some_q(4, lanes), some(36, lanes)
-        logical :: here(lanes)
-        integer :: l
+        integer, intent(in) :: kind, n
+        type(waiting_states), intent(inout) :: waiting
+        real(wp), intent(inout) :: m(3, n), q(4, n), transition(36, n)
+        integer, intent(inout) :: refused
+        type(lane_orbits) :: orbits
+        real(wp) :: its_transition(36, lanes)
+        integer :: count, l, one, many(kinds)
 
-        call keep_lanes(kind, orbits, kept, here)
-        call step_lanes(kind, of, kept, some_m, some_q, some)
-        do l = 1, count
-            if (.not. here(l)) cycle
-            m(:, l) = some_m(:, l)
-            q(:, l) = some_q(:, l)
-            transition(:, l) = some(:, l)
-        end do
-        served = served .or. here
-    end subroutine step_some
+        count = waiting%count(kind)
+        if (count == 0) return
+        waiting%count(kind) = 0
+        associate (number => waiting%number(:, kind), its_m => waiting%m(:, :, kind), &
+                   its_q => waiting%q(:, :, kind))
+            if (kind > kinds) then
+                do l = 1, count
+                    call tangent_body(body, h, its_m(:, l), one, 0, its_q(:, l), its_transition(:, l))
+                    refused = max(refused, one)
+                end do
+            else
+                do l = count + 1, lanes
+                    its_m(:, l) = its_m(:, count)
+                    its_q(:, l) = its_q(:, count)
+                end do
+                call load_lanes(of, its_m, its_q, orbits, many)
+                call step_lanes(kind, of, orbits, its_m, its_q, its_transition)
+            end if
+            do l = 1, count
+                m(:, number(l)) = its_m(:, l)
+                q(:, number(l)) = its_q(:, l)
+                transition(:, number(l)) = its_transition(:, l)
+            end do
+        end associate
+    end subroutine step_kind
 
     !> Advances a whole block.
     pure subroutine step_lanes(kind, of, orbits, m, q, transition)
@@ -148,7 +197,7 @@ contains
         if (kind == far) then
             call step_far(of, orbits, m, q, transition)
         else
-            call step_near(kind == tiny, of, orbits, m, q, transition)
+            call step_near(kind, of, orbits, m, q, transition)
         end if
     end subroutine step_lanes
 

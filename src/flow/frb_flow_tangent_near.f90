@@ -1,9 +1,9 @@
-!> Short steps of a block of bodies, one body per SIMD lane: see tangent_step_turn.inc. The loops are short,
-!> so that a processor has several vectors in work. The shortest steps take rho and its gradient from the
-!> polynomial of frb_flow_lanes, in a seventh less time.
+!> Steps of a block of bodies that the series reach, one body per SIMD lane: see tangent_step_turn.inc. The
+!> loops are short, so that a processor has several vectors in work. The shortest steps take rho and its
+!> gradient from the polynomial of frb_flow_lanes, in a seventh less time.
 module frb_flow_tangent_near
     use frb_flow_limits, only: plain_smallest
-    use frb_flow_tangent_lanes, only: lanes, lane_body, lane_orbits, of_m, of_q, of_phi
+    use frb_flow_tangent_lanes, only: lanes, tiny, short, lane_body, lane_orbits, of_m, of_q, of_phi
     use frb_kinds, only: wp
     implicit none
     private
@@ -12,9 +12,9 @@ module frb_flow_tangent_near
 
     !> Numbers that one loop computes and another one uses.
     type :: series_lanes
-        real(wp), dimension(lanes) :: y, scd, dd, aa, bb, third     !! s^2, s c d; D, A, B, H
+        real(wp), dimension(lanes) :: dd, aa, bb, third             !! D, A, B, H
         real(wp), dimension(lanes) :: nu, side                      !! of the form; 1: first, -1: mirror form
-        real(wp), dimension(lanes) :: over_cc, over_dd, over_d0, l1, l2, l3     !! middle_momentum
+        real(wp), dimension(lanes) :: y, scd, over_cc, over_dd, l1, l2, l3          !! middle_momentum
         real(wp), dimension(lanes) :: l11, l12, l13, l21, l22, l23, l31, l32, l33
         real(wp), dimension(lanes) :: psi, cotangent, slope         !! turn_rate
         real(wp), dimension(lanes) :: kappa, r1, r2, r3             !! kappa_1, grad rho
@@ -23,9 +23,9 @@ module frb_flow_tangent_near
 
 contains
 
-    !> Advances the lanes of a block, of which all that are served have short steps.
-    pure subroutine step_near(is_tiny, body, of, m, q, phi)
-        logical, intent(in) :: is_tiny      !! the first terms of the series are enough
+    !> Advances the lanes of a block, of which all that are served have steps of one kind, `far` excluded.
+    pure subroutine step_near(kind, body, of, m, q, phi)
+        integer, intent(in) :: kind
         type(lane_body), intent(in) :: body
         type(lane_orbits), intent(in) :: of
         real(wp), intent(inout) :: m(3*lanes), q(4*lanes), phi(36*lanes)
@@ -37,14 +37,16 @@ contains
         end do
         w = j + 3
         e = j + 21
-        if (is_tiny) then
+        if (kind /= tiny) call choose_forms(body, of, it)
+        if (kind == tiny) then
             call find_tiny_series(of, it)
+        else if (kind == short) then
+            call find_short_series(of, it)
         else
-            call find_series(body, of, it)
+            call find_middle_series(of, it)
         end if
         call find_middles(body, of, it)
-        call find_gradients(body, of, it)
-        if (is_tiny) then
+        if (kind == tiny) then
             call find_tiny_rates(body, of, it)
         else
             call find_angles(body, of, it)
@@ -63,73 +65,107 @@ contains
         end associate
     end subroutine step_near
 
-    !> The triple and the integrals; of the two forms the one with the smaller nu.
-    pure subroutine find_series(body, of, it)
+    !> Of the two mirror forms the one with the smaller nu.
+    pure subroutine choose_forms(body, of, it)
         type(lane_body), intent(in) :: body
         type(lane_orbits), intent(in) :: of
         type(series_lanes), intent(inout) :: it
-        real(wp) :: p, r, x2, nu, mirror
+        real(wp) :: x2, nu, mirror
         integer :: l
 
         do l = 1, lanes
-            p = of%p(l)
-            r = of%r(l)
-            call short_series(p + r, p*r, it%y(l), it%scd(l))
-            call short_integrals(p + r, p*r, p, r, it%dd(l), it%aa(l), it%bb(l))
             x2 = of%m2(l)*of%m2(l)
             nu = body%g*(body%g*x2 + body%b*(of%m3(l)*of%m3(l)))
             mirror = body%a*(body%a*x2 + body%b*(of%m1(l)*of%m1(l)))
             it%side(l) = merge(1.0_wp, -1.0_wp, nu <= mirror)
-            nu = min(nu, mirror)
-            it%nu(l) = nu
-            it%third(l) = short_third_kind(p + r, p*r, nu)
+            it%nu(l) = min(nu, mirror)
         end do
-    end subroutine find_series
+    end subroutine choose_forms
 
-    !> The first terms of the triple and the integrals.
-    pure subroutine find_tiny_series(of, it)
+    !> The integrals.
+    pure subroutine find_short_series(of, it)
         type(lane_orbits), intent(in) :: of
         type(series_lanes), intent(inout) :: it
-        real(wp) :: p, r, dd
+        real(wp) :: p, r
         integer :: l
 
         do l = 1, lanes
             p = of%p(l)
             r = of%r(l)
-            call tiny_series(p + r, p*r, it%y(l), it%scd(l))
-            call tiny_integrals(p + r, p*r, p, r, dd, it%aa(l), it%bb(l))
+            call short_integrals(p + r, p*r, p, r, it%dd(l), it%aa(l), it%bb(l))
+            it%third(l) = short_third_kind(p + r, p*r, it%nu(l))
+        end do
+    end subroutine find_short_series
+
+    !> The same by more terms.
+    pure subroutine find_middle_series(of, it)
+        type(lane_orbits), intent(in) :: of
+        type(series_lanes), intent(inout) :: it
+        real(wp) :: p, r, y, scd, s3, dd, aa, bb
+        integer :: l
+
+        do l = 1, lanes
+            p = of%p(l)
+            r = of%r(l)
+            call middle_series(p + r, p*r, it%y(l), scd)
+        end do
+        do l = 1, lanes
+            y = it%y(l)
+            p = of%p(l)*y
+            r = of%r(l)*y
+            s3 = y*sqrt(y)
+            call middle_integrals(p, r, dd, aa, bb)
+            it%dd(l) = s3*dd
+            it%aa(l) = s3*aa
+            it%bb(l) = s3*bb
+            it%third(l) = s3*middle_third_kind(p, r, it%nu(l)*y)
+        end do
+    end subroutine find_middle_series
+
+    !> The first terms of the integrals.
+    pure subroutine find_tiny_series(of, it)
+        type(lane_orbits), intent(in) :: of
+        type(series_lanes), intent(inout) :: it
+        real(wp) :: p, r
+        integer :: l
+
+        do l = 1, lanes
+            p = of%p(l)
+            r = of%r(l)
+            call tiny_integrals(p + r, p*r, p, r, it%dd(l), it%aa(l), it%bb(l))
         end do
     end subroutine find_tiny_series
 
-    !> L.
+    !> L and its derivative.
     pure subroutine find_middles(body, of, it)
         type(lane_body), intent(in) :: body
         type(lane_orbits), intent(in) :: of
         type(series_lanes), intent(inout) :: it
+        real(wp) :: m1, m2, m3, p, r, aa, bb, y, over_cc, over_dd, over_d0, x1, x2, x3, z, l1, l2, l3
         integer :: l
 
         do l = 1, lanes
-            call middle_momentum(body%a, body%b, body%g, of%m1(l), of%m2(l), of%m3(l), of%p(l), of%r(l), &
-                                 it%y(l), it%scd(l), it%over_cc(l), it%over_dd(l), it%over_d0(l), it%l1(l), &
-                                 it%l2(l), it%l3(l))
-        end do
-    end subroutine find_middles
-
-    !> The derivative of L.
-    pure subroutine find_gradients(body, of, it)
-        type(lane_body), intent(in) :: body
-        type(lane_orbits), intent(in) :: of
-        type(series_lanes), intent(inout) :: it
-        integer :: l
-
-        do l = 1, lanes
-            call middle_by_momentum(body%a, body%b, body%g, of%m1(l), of%m2(l), of%m3(l), of%p(l), of%r(l), &
-                                    it%y(l), it%scd(l), it%aa(l), it%bb(l), it%over_cc(l), it%over_dd(l), &
-                                    it%over_d0(l), it%l1(l), it%l2(l), it%l3(l), &
+            m1 = of%m1(l)
+            m2 = of%m2(l)
+            m3 = of%m3(l)
+            p = of%p(l)
+            r = of%r(l)
+            aa = it%aa(l)
+            bb = it%bb(l)
+            call middle_momentum(body%a, body%b, body%g, m1, m2, m3, p, r, it%dd(l), aa, bb, y, it%scd(l), &
+                                 over_cc, over_dd, over_d0, x1, x2, x3, z, l1, l2, l3)
+            call middle_by_momentum(body%a, body%b, body%g, m1, m2, m3, p, r, y, aa, bb, over_cc, over_dd, &
+                                    over_d0, x1, x2, x3, z, l1, l2, l3, &
                                     it%l11(l), it%l12(l), it%l13(l), it%l21(l), it%l22(l), it%l23(l), &
                                     it%l31(l), it%l32(l), it%l33(l))
+            it%y(l) = y
+            it%over_cc(l) = over_cc
+            it%over_dd(l) = over_dd
+            it%l1(l) = l1
+            it%l2(l) = l2
+            it%l3(l) = l3
         end do
-    end subroutine find_gradients
+    end subroutine find_middles
 
     !> The turn Y, and momenta at the end.
     pure subroutine find_momenta(body, of, it, n1, n2, n3)
@@ -267,7 +303,7 @@ contains
             y1 = it%y1(l)
             y2 = it%y2(l)
             y3 = it%y3(l)
-            w0 = small_norm(y1*y1 + (y2*y2 + y3*y3))
+            w0 = norm_change(y1*y1 + (y2*y2 + y3*y3))
             q0 = b0(l)
             q1 = b1(l)
             q2 = b2(l)
@@ -330,17 +366,21 @@ contains
         end do
     end subroutine set_turns
 
-    include 'tiny_formulas.inc'
-
-    include 'series_formulas.inc'
-
     include 'short_coefficients.inc'
 
     include 'short_third_kind.inc'
 
+    include 'middle_formulas.inc'
+
+    include 'middle_coefficients.inc'
+
+    include 'middle_third_kind.inc'
+
     include 'tangent_tiny_integrals.inc'
 
     include 'tangent_short_integrals.inc'
+
+    include 'tangent_middle_formulas.inc'
 
     include 'tangent_step_turn.inc'
 
