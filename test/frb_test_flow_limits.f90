@@ -2,7 +2,7 @@
 !> the separatrix; next to the separatrix against Taylor series.
 module frb_test_flow_limits
     use frb_checks, only: tally, worst_of
-    use frb_flow_samples, only: stream, true_case, advanced, made_finite, near_separatrix, no_turn, &
+    use frb_flow_samples, only: stream, true_case, advanced, made_finite, near_separatrix, defect, no_turn, &
         no_rotation
     use frb_free_flow, only: free_flow, rigid_body
     use frb_kinds, only: wp, qp, has_quad
@@ -24,10 +24,11 @@ contains
     subroutine test_flow_limits(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('flow-limits', 24)
+        call t%open_suite('flow-limits', 25)
         call check_sphere(t)
         call check_symmetric_tops(t)
         call check_axes(t)
+        call check_tiny_deviations(t)
         if (t%provided(has_quad, 3, 'on the separatrix, which needs 30 digits')) call check_separatrix(t)
         if (t%provided(has_quad, 4, 'next to the separatrix, which needs 30 digits')) call check_both_sides(t)
         call t%close_suite()
@@ -147,6 +148,25 @@ contains
             call t%at_most('body-turns-about-'//names(j), worst, closed_form)
         end do
     end subroutine check_axes
+
+    !> Deviations of 1e-60 to 1e-104 from the unstable axis, over many decay times: squares of the triple and
+    !> of the momentum at mid-step could underflow.
+    subroutine check_tiny_deviations(t)
+        type(tally), intent(inout) :: t
+        real(wp), parameter :: moments(3) = [0.6_wp, 0.8_wp, 1.0_wp]
+        type(stream) :: random
+        real(wp) :: m0(3), h, worst
+        integer :: i
+
+        worst = 0.0_wp
+        do i = 1, 2000
+            m0 = random%log_uniform(-104.0_wp, -60.0_wp)*random%direction()
+            m0(2) = 1.0_wp
+            h = random%uniform(0.0_wp, 2500.0_wp)
+            worst = worst_of(worst, defect(moments, m0, advanced(moments, m0, h)))
+        end do
+        call t%at_most('tiny-deviations-from-the-unstable-axis-stay-on-the-orbit', worst, 1.0e-12_wp)
+    end subroutine check_tiny_deviations
 
     !> I = 2, 3, 6 and |m1| = |m3|: the separatrix to the last bit. m2 = |m| tanh(kappa), m1 and m3 fall as
     !> sech(kappa), kappa grows by +-|m| h/6; and as the energy is that of a turn about axis 2, that axis
