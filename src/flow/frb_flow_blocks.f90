@@ -11,7 +11,7 @@ module frb_flow_blocks
     implicit none
     private
 
-    public :: block_of_bodies, set_bodies, step_block, whole, polynomial_of_rho
+    public :: block_of_bodies, set_bodies, step_block, find_classes, whole, polynomial_of_rho
 
     integer, parameter :: same_axes = 1, shifted_axes = 2, turned_axes = 3
 
@@ -36,40 +36,41 @@ contains
         full = vector*((count + vector - 1)/vector)
     end function whole
 
-    !> The constants of `count` bodies from the first, each with its time; lanes up to a whole vector repeat
-    !> the last one. Lanes that are not plain, those of refused bodies among them, have constants 0.
-    pure subroutine set_bodies(body, alike, h, first, count, block)
+    !> The constants of `count` bodies, each with its time; lanes up to a whole vector repeat the last one.
+    !> Lanes that are not plain, those of refused bodies among them, have constants 0.
+    pure subroutine set_bodies(body, alike, h, number, count, block)
         type(body_core), intent(in) :: body(:)
         logical, intent(in) :: alike
         real(wp), intent(in) :: h(:)
-        integer, intent(in) :: first, count
+        integer, intent(in) :: count, number(lanes)     !! which of the bodies, and of the times
         type(block_of_bodies), intent(inout) :: block
-        real(wp) :: t(lanes), axis
+        real(wp) :: t(lanes), axis, axis_of_first
         integer(int64) :: plain_lanes, turned, apart
-        integer :: l, full, low, last, cyclic(3)
+        integer :: l, full, cyclic(3)
 
         full = whole(count)
-        call gather(body, first, count, full, block%lane, block%of)
+        call gather(body, number, count, full, block%lane, block%of)
         turned = 0
         apart = 0
-        low = min(size(body), first)
-        do l = low, min(size(body), first - 1 + count)
-            axis = abs(body(l)%lane)
+        axis_of_first = abs(block%lane(1))
+        do l = 1, full
+            axis = abs(block%lane(l))
             turned = turned + merge(1_int64, 0_int64, axis > 3.5_wp)
-            apart = apart + merge(1_int64, 0_int64, abs(axis - abs(body(low)%lane)) > 0.5_wp)
+            apart = apart + merge(1_int64, 0_int64, abs(axis - axis_of_first) > 0.5_wp)
         end do
-        block%axes_are = merge(same_axes, merge(shifted_axes, turned_axes, turned == 0), apart + turned == 0)
-        block%column = [1, 2, 3]
-        if (block%axes_are == same_axes) block%column = 1 + modulo([4, 5, 6] - int(abs(body(low)%lane)), 3)
         if (size(h) == 1) then
             t(:full) = merge(0.5_wp*h(1), 0.0_wp, abs(h(1)) < plain_largest)
         else
-            last = first + count - 1
-            t(:count) = merge(h(first:last), 0.0_wp, ieee_is_finite(h(first:last)))
-            t(count + 1:full) = merge(h(last), 0.0_wp, ieee_is_finite(h(last)))
+            do l = 1, full
+                t(l) = h(number(min(l, count)))
+            end do
+            t(:full) = merge(t(:full), 0.0_wp, ieee_is_finite(t(:full)))
             ! A time of 0 goes on as one that is too large does: by itself.
             t(:full) = merge(0.5_wp*t(:full), 0.0_wp, abs(t(:full)) < plain_largest)
         end if
+        block%axes_are = merge(same_axes, merge(shifted_axes, turned_axes, turned == 0), apart + turned == 0)
+        block%column = [1, 2, 3]
+        if (block%axes_are == same_axes) block%column = 1 + modulo([4, 5, 6] - int(axis_of_first), 3)
         call scale_by_time(full, t, block%lane, block%of, plain_lanes)
         block%all_plain = plain_lanes == full
         block%of%alike = alike
@@ -79,7 +80,7 @@ contains
         block%of%rho_known = .false.
         if (block%axes_are /= turned_axes) return
         do l = 1, full
-            associate (given => body(min(size(body), first + min(l, count) - 1)))
+            associate (given => body(min(size(body), number(min(l, count)))))
                 cyclic = given%order
                 if (given%parity < 0) cyclic = given%order([3, 2, 1])
                 block%high(l, :, :) = given%axes_high(:, cyclic)
@@ -88,33 +89,44 @@ contains
         end do
     end subroutine set_bodies
 
-    !> Constants as columns, of the only body or of `count` bodies from number `first` on.
-    pure subroutine gather(body, first, count, full, lane, of)
+    !> Constants as columns, of the only body or of `count` bodies of these ascending numbers.
+    pure subroutine gather(body, number, count, full, lane, of)
         type(body_core), intent(in) :: body(:)
-        integer, intent(in) :: first, count, full
+        integer, intent(in) :: number(lanes), count, full
         real(wp), intent(inout) :: lane(lanes)
         type(lane_bodies), intent(inout) :: of
-        integer :: l, known, last
+        integer :: l, known, before
 
         known = merge(count, 0, size(body) > 1)
-        do l = 1, known
-            lane(l) = body(first - 1 + l)%lane
-            of%a(l) = body(first - 1 + l)%alpha
-            of%b(l) = body(first - 1 + l)%beta
-            of%g(l) = body(first - 1 + l)%gamma
-            of%first(l) = body(first - 1 + l)%a(1)
-            of%last(l) = body(first - 1 + l)%a(3)
-        end do
-        last = min(size(body), first - 1 + count)
+        before = number(1) - 1
+        if (number(count) - before == count) then
+            do l = 1, known
+                call put_constants(body(before + l), l, lane, of)
+            end do
+        else
+            do l = 1, known
+                call put_constants(body(number(l)), l, lane, of)
+            end do
+        end if
         do l = known + 1, full
-            lane(l) = body(last)%lane
-            of%a(l) = body(last)%alpha
-            of%b(l) = body(last)%beta
-            of%g(l) = body(last)%gamma
-            of%first(l) = body(last)%a(1)
-            of%last(l) = body(last)%a(3)
+            call put_constants(body(min(size(body), number(count))), l, lane, of)
         end do
     end subroutine gather
+
+    !> Constants of a body as those of lane l.
+    pure subroutine put_constants(body, l, lane, of)
+        type(body_core), intent(in) :: body
+        integer, intent(in) :: l
+        real(wp), intent(inout) :: lane(lanes)
+        type(lane_bodies), intent(inout) :: of
+
+        lane(l) = body%lane
+        of%a(l) = body%alpha
+        of%b(l) = body%beta
+        of%g(l) = body%gamma
+        of%first(l) = body%a(1)
+        of%last(l) = body%a(3)
+    end subroutine put_constants
 
     !> The constant rho of frb_flow_lanes as a polynomial in u and e to degree 4: coefficients of u to u^4, of
     !> e to e u^3, of e^2 to e^2 u^2, of e^3, e^3 u and of e^4.
@@ -270,76 +282,81 @@ contains
     end subroutine from_cyclic
 
     !> The step of n lanes with momenta (x1, x2, x3) in body axes, plain numbers: increments and,
-    !> with_attitude, turns in columns as `block` has them. Lanes of a size beyond the limits do not move.
-    pure subroutine step_block(n, with_attitude, block, x1, x2, x3, work, all_moved)
+    !> with_attitude, turns in columns as `block` has them. Lanes of several classes: those of the class that
+    !> most have; the others stand still.
+    pure subroutine step_block(n, with_attitude, block, x1, x2, x3, work, class, moved)
         integer, intent(in) :: n
         logical, intent(in) :: with_attitude
         type(block_of_bodies), intent(inout) :: block
         real(wp), intent(in) :: x1(n), x2(n), x3(n)
         type(workspace), intent(inout) :: work
-        logical, intent(out) :: all_moved
+        integer, intent(out) :: class       !! that moves; 0: none has half of the lanes, or a lane has none
+        integer, intent(out) :: moved       !! number of lanes of this class
         real(wp) :: cyclic(lanes, 3)
 
         if (block%axes_are /= same_axes) then
             call to_cyclic(n, block, x1, x2, x3, cyclic)
             call step_cyclic(n, with_attitude, block%of, cyclic(:, 1), cyclic(:, 2), cyclic(:, 3), work, &
-                             all_moved)
+                             class, moved)
+            if (class == 0) return
             call from_cyclic(n, block, work%d)
             if (with_attitude) call from_cyclic(n, block, work%w)
         else if (block%column(1) == 1) then
-            call step_cyclic(n, with_attitude, block%of, x1, x2, x3, work, all_moved)
+            call step_cyclic(n, with_attitude, block%of, x1, x2, x3, work, class, moved)
         else if (block%column(1) == 2) then
-            call step_cyclic(n, with_attitude, block%of, x3, x1, x2, work, all_moved)
+            call step_cyclic(n, with_attitude, block%of, x3, x1, x2, work, class, moved)
         else
-            call step_cyclic(n, with_attitude, block%of, x2, x3, x1, work, all_moved)
+            call step_cyclic(n, with_attitude, block%of, x2, x3, x1, work, class, moved)
         end if
     end subroutine step_block
 
-    !> The same in cyclic axes. Lanes of several classes: one class after another, while the other lanes stand
-    !> still.
-    pure subroutine step_cyclic(n, with_attitude, of, x1, x2, x3, work, all_moved)
+    !> The same in cyclic axes.
+    pure subroutine step_cyclic(n, with_attitude, of, x1, x2, x3, work, class, moved)
         integer, intent(in) :: n
         logical, intent(in) :: with_attitude
         type(lane_bodies), intent(inout) :: of
         real(wp), intent(in) :: x1(n), x2(n), x3(n)
         type(workspace), intent(inout) :: work
-        logical, intent(out) :: all_moved
-        type(workspace) :: some
-        real(wp) :: m1(lanes), m2(lanes), m3(lanes)
-        logical :: mine(lanes)
-        integer :: many(0:classes), class, l
+        integer, intent(out) :: class, moved
+        real(wp) :: m1(lanes), m2(lanes), m3(lanes), factor
+        integer :: many(0:classes), l
 
         call measure(n, of, x1, x2, x3, work, many)
-        all_moved = many(classes) == n
-        do class = 1, classes
-            if (many(class) - many(class - 1) == n) then
-                call step_class(class, n, with_attitude, of, x1, x2, x3, work)
-                return
-            end if
-        end do
-        work%d = 0.0_wp
-        work%w0 = 0.0_wp
-        work%w = 0.0_wp
-        do class = 1, classes
-            if (many(class) == many(class - 1)) cycle
-            mine(:n) = work%size(:n) <= limits(class)
-            if (many(class - 1) > 0) mine(:n) = mine(:n) .and. work%size(:n) > limits(class - 1)
-            m1(:n) = merge(x1, 0.0_wp, mine(:n))
-            m2(:n) = merge(x2, 0.0_wp, mine(:n))
-            m3(:n) = merge(x3, 0.0_wp, mine(:n))
-            some%p(:n) = merge(work%p(:n), 0.0_wp, mine(:n))
-            some%r(:n) = merge(work%r(:n), 0.0_wp, mine(:n))
-            some%size(:n) = merge(work%size(:n), 0.0_wp, mine(:n))
-            call step_class(class, n, with_attitude, of, m1, m2, m3, some)
+        class = maxloc(many(1:) - many(:classes - 1), 1)
+        moved = many(class) - many(class - 1)
+        if (moved == n) then
+            call step_class(class, n, with_attitude, of, x1, x2, x3, work)
+        else if (2*moved < n .or. many(classes) < n) then
+            class = 0
+        else
             do l = 1, n
-                if (.not. mine(l)) cycle
-                work%d(l, :) = some%d(l, :)
-                if (.not. with_attitude) cycle
-                work%w0(l) = some%w0(l)
-                work%w(l, :) = some%w(l, :)
+                factor = merge(1.0_wp, 0.0_wp, work%size(l) <= limits(class))
+                if (many(class - 1) > 0) factor = merge(0.0_wp, factor, work%size(l) <= limits(class - 1))
+                m1(l) = factor*x1(l)
+                m2(l) = factor*x2(l)
+                m3(l) = factor*x3(l)
+                work%p(l) = factor*work%p(l)
+                work%r(l) = factor*work%r(l)
+            end do
+            call step_class(class, n, with_attitude, of, m1(:n), m2(:n), m3(:n), work)
+        end if
+    end subroutine step_cyclic
+
+    !> The classes of steps of these sizes; `classes` + 1 where the lanes do not serve them.
+    pure subroutine find_classes(n, alike, sizes, found)
+        integer, intent(in) :: n
+        logical, intent(in) :: alike            !! see measure
+        real(wp), intent(in) :: sizes(lanes)
+        integer, intent(out) :: found(lanes)
+        integer :: l, i
+
+        found(:n) = merge(1, 2, alike)
+        do i = merge(1, 2, alike), classes
+            do l = 1, n
+                found(l) = found(l) + merge(1, 0, sizes(l) > limits(i))
             end do
         end do
-    end subroutine step_cyclic
+    end subroutine find_classes
 
     !> The step of lanes of one class.
     pure subroutine step_class(class, n, with_attitude, of, x1, x2, x3, work)

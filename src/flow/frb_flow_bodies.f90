@@ -1,8 +1,8 @@
 !> Many free bodies at once: the bodies of a block share SIMD lanes, blocks are shared among threads.
 module frb_flow_bodies
-    use frb_flow_blocks, only: block_of_bodies, set_bodies, step_block, whole
-    use frb_flow_lanes, only: lanes, workspace
-    use frb_flow_limits, only: period_limit, plain_largest, plain_smallest
+    use frb_flow_blocks, only: block_of_bodies, set_bodies, step_block, find_classes, whole
+    use frb_flow_lanes, only: lanes, classes, workspace
+    use frb_flow_limits, only: plain_largest, plain_smallest
     use frb_flow_one, only: flow_body
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
@@ -13,6 +13,15 @@ module frb_flow_bodies
     private
 
     public :: flow_many, flow_rows, flow_columns
+
+    integer, parameter :: group = 16*lanes      !! bodies that a thread takes at a time
+    integer, parameter :: first_of_all(lanes) = 1
+
+    !> Bodies that wait, and their states, by class; those of class `classes` + 1 are moved one by one.
+    type :: waiting_states
+        integer :: count(classes + 1), number(lanes, classes + 1)
+        real(wp) :: m(lanes, 3, classes + 1), q(lanes, 4, classes + 1)
+    end type waiting_states
 
 contains
 
@@ -78,10 +87,10 @@ contains
     end subroutine flow_columns
 
     !> Advances n bodies in blocks, one body per SIMD lane. The components of the states are vectors, as in
-    !> BLAS: ldm and ldq are the distances from a body to the next. The blocks are independent: with -fopenmp
-    !> they are shared among the threads. What becomes of a body does not depend on the others: the same bits
-    !> for any threads and parts of a batch. (So one body takes a block too, though a call for it alone is
-    !> faster.)
+    !> BLAS: ldm and ldq are the distances from a body to the next. Groups of blocks are independent: with
+    !> -fopenmp they are shared among the threads. What becomes of a body does not depend on the others: the
+    !> same bits, but for the sign of 0, for any threads and parts of a batch. (So one body takes a block too,
+    !> though a call for it alone is faster.)
     subroutine flow_vectors(body, alike, h, n, ldm, ldq, m1, m2, m3, code, q0, q1, q2, q3)
         type(body_core), intent(in) :: body(:)      !! one for all or n
         logical, intent(in) :: alike                !! body(1) is meant for all, whatever n
@@ -92,8 +101,7 @@ contains
         integer, intent(out) :: code                !! the largest of those of the bodies
         real(wp), intent(inout), optional :: q0(0:*), q1(0:*), q2(0:*), q3(0:*)
         type(block_of_bodies) :: block
-        logical :: blocks_differ
-        integer :: first, count, refused
+        integer :: first, refused
 
         code = status_bad_count
         if (all(size(body) /= [1, n]) .or. all(size(h) /= [1, n])) return
@@ -104,114 +112,106 @@ contains
         end if
         if (code /= status_ok .or. n == 0) return
         refused = status_ok
-        blocks_differ = max(size(body), size(h)) > 1
-        if (.not. blocks_differ) call set_bodies(body, alike, h, 1, min(n, lanes), block)
-        !$omp parallel do if (n >= 64*lanes) firstprivate(block) private(count) reduction(max: refused)
-        do first = 1, n, lanes
-            count = min(lanes, n - first + 1)
-            if (blocks_differ) call set_bodies(body, alike, h, first, count, block)
-            call flow_block(body, h, first, count, block, ldm, ldq, m1, m2, m3, refused, q0, q1, q2, q3)
+        if (max(size(body), size(h)) == 1) call set_bodies(body, alike, h, first_of_all, min(n, lanes), block)
+        !$omp parallel do if (n >= 4*group) firstprivate(block) reduction(max: refused)
+        do first = 1, n, group
+            call flow_group(body, alike, h, first, first + min(group - 1, n - first), block, ldm, ldq, m1, &
+                            m2, m3, refused, q0, q1, q2, q3)
         end do
         !$omp end parallel do
         code = refused
     end subroutine flow_vectors
 
-    !> One block. Bodies that the lanes cannot move are moved by flow_body.
-    subroutine flow_block(body, h, first, count, block, ldm, ldq, m1, m2, m3, refused, q0, q1, q2, q3)
+    !> Bodies from `low` to `high`. A step of a block takes as long for one lane as for all: so where a block
+    !> needs steps of several classes, the class that half of it has steps at once, and the other bodies wait,
+    !> as columns, for others of their class.
+    subroutine flow_group(body, alike, h, low, high, block, ldm, ldq, m1, m2, m3, refused, q0, q1, q2, q3)
         type(body_core), intent(in) :: body(:)
+        logical, intent(in) :: alike
         real(wp), intent(in) :: h(:)
-        integer, intent(in) :: first, count
+        integer, intent(in) :: low, high
+        type(block_of_bodies), intent(inout) :: block       !! set, if it is the same for all
         integer(c_size_t), intent(in) :: ldm, ldq
+        real(wp), intent(inout) :: m1(0:*), m2(0:*), m3(0:*)
+        integer, intent(inout) :: refused
+        real(wp), intent(inout), optional :: q0(0:*), q1(0:*), q2(0:*), q3(0:*)
+        type(waiting_states) :: waiting
+        type(workspace) :: work
+        real(wp) :: m(lanes, 3), q(lanes, 4)
+        integer :: first, count, done, moved, class, l, number(lanes)
+
+        waiting%count = 0
+        do first = low, high, lanes
+            count = min(lanes, high - first + 1)
+            if (max(size(body), size(h)) > 1) then
+                do l = 1, count
+                    number(l) = first - 1 + l
+                end do
+                call set_bodies(body, alike, h, number, count, block)
+            end if
+            call load(first, count, block, ldm, ldq, m1, m2, m3, m, q, q0, q1, q2, q3)
+            call step_block(whole(count), present(q0), block, m(:, 1), m(:, 2), m(:, 3), work, done, moved)
+            if (done > 0) call store(first, count, block%column, work, ldm, ldq, m, q, m1, m2, m3, q0, q1, &
+                                     q2, q3)
+            if (moved == whole(count)) cycle
+            call find_classes(count, alike, work%size, number)
+            do l = 1, count
+                class = number(l)
+                if (class == done) cycle
+                associate (n => waiting%count(class))
+                    n = n + 1
+                    waiting%number(n, class) = first - 1 + l
+                    waiting%m(n, :, class) = m(l, :)
+                    if (present(q0)) waiting%q(n, :, class) = q(l, :)
+                    if (n == lanes) call flow_class(body, alike, h, class, waiting, block, ldm, ldq, m1, &
+                                                    m2, m3, refused, q0, q1, q2, q3)
+                end associate
+            end do
+        end do
+        do class = 1, classes + 1
+            if (waiting%count(class) > 0) call flow_class(body, alike, h, class, waiting, block, ldm, ldq, &
+                                                          m1, m2, m3, refused, q0, q1, q2, q3)
+        end do
+    end subroutine flow_group
+
+    !> Advances the bodies of one class that wait.
+    subroutine flow_class(body, alike, h, class, waiting, block, ldm, ldq, m1, m2, m3, refused, q0, q1, &
+                          q2, q3)
+        type(body_core), intent(in) :: body(:)
+        logical, intent(in) :: alike
+        real(wp), intent(in) :: h(:)
+        integer, intent(in) :: class
+        type(waiting_states), intent(inout) :: waiting
         type(block_of_bodies), intent(inout) :: block
+        integer(c_size_t), intent(in) :: ldm, ldq
         real(wp), intent(inout) :: m1(0:*), m2(0:*), m3(0:*)
         integer, intent(inout) :: refused
         real(wp), intent(inout), optional :: q0(0:*), q1(0:*), q2(0:*), q3(0:*)
         type(workspace) :: work
-        real(wp) :: m(lanes, 3), total(lanes)
-        logical :: all_moved
-        integer :: l, high, step
+        integer :: done, moved, n, l
 
-        if (present(q0)) then
-            call measure_attitudes(first, count, ldq, q0, q1, q2, q3, total)
-        else
-            total(:count) = 0.0_wp
-        end if
-        call load_momenta(first, count, whole(count), total, ldm, m1, m2, m3, m)
-        if (.not. block%all_plain) call stop_lanes(whole(count), block%lane, m)
-        call step_block(whole(count), present(q0), block, m(:, 1), m(:, 2), m(:, 3), work, all_moved)
-        step = merge(count, 1, all_moved)
-        do l = 1, count, step
-            high = l + step - 1
-            if (all_moved .or. work%size(l) <= period_limit) then
-                associate (d => work%d, w => work%w, c => block%column)
-                    call add(first, l, high, m, d(:, c(1)), d(:, c(2)), d(:, c(3)), ldm, m1, m2, m3)
-                    if (.not. present(q0)) cycle
-                    call turn_attitudes(first, l, high, work%w0, w(:, c(1)), w(:, c(2)), w(:, c(3)), &
-                                        ldq, q0, q1, q2, q3)
-                end associate
-            else
-                call flow_single(body, h, first + l - 1, ldm, ldq, m1, m2, m3, refused, q0, q1, q2, q3)
+        n = waiting%count(class)
+        waiting%count(class) = 0
+        done = 0
+        associate (number => waiting%number(:, class), m => waiting%m(:, :, class), &
+                   q => waiting%q(:, :, class))
+            if (class <= classes) then
+                m(n + 1:, 1) = m(n, 1)
+                m(n + 1:, 2) = m(n, 2)
+                m(n + 1:, 3) = m(n, 3)
+                if (max(size(body), size(h)) > 1) call set_bodies(body, alike, h, number, n, block)
+                call step_block(whole(n), present(q0), block, m(:, 1), m(:, 2), m(:, 3), work, done, &
+                                moved)
             end if
-        end do
-    end subroutine flow_block
-
-    !> A quarter of the sums of sizes of components; `plain_largest` for NaN and for attitudes near zero.
-    pure subroutine measure_attitudes(first, count, ldq, q0, q1, q2, q3, total)
-        integer, intent(in) :: first, count
-        integer(c_size_t), intent(in) :: ldq
-        real(wp), intent(in) :: q0(0:*), q1(0:*), q2(0:*), q3(0:*)
-        real(wp), intent(out) :: total(lanes)
-        real(wp) :: sizes
-        integer(c_size_t) :: k
-        integer :: l
-
-        do l = 1, count
-            k = (first - 2 + l)*ldq
-            sizes = (0.25_wp*abs(q0(k)) + 0.25_wp*abs(q1(k))) + (0.25_wp*abs(q2(k)) + 0.25_wp*abs(q3(k)))
-            sizes = merge(plain_largest, sizes, ieee_is_nan(sizes))     ! comparing a NaN would raise a flag
-            total(l) = merge(plain_largest, 0.25_wp*sizes, sizes < plain_smallest)
-        end do
-    end subroutine measure_attitudes
-
-    !> Momenta as columns; lanes up to a whole vector repeat the last one. Where the components of the state
-    !> are not finite or near overflow, the momentum is 0: the lanes do not move it.
-    pure subroutine load_momenta(first, count, full, total, ldm, m1, m2, m3, m)
-        integer, intent(in) :: first, count, full
-        integer(c_size_t), intent(in) :: ldm
-        real(wp), intent(in) :: total(lanes)        !! of the attitudes
-        real(wp), intent(in) :: m1(0:*), m2(0:*), m3(0:*)
-        real(wp), intent(out) :: m(lanes, 3)
-        real(wp) :: x1, x2, x3, sizes
-        integer(c_size_t) :: k
-        integer :: l
-
-        do l = 1, count
-            k = (first - 2 + l)*ldm
-            x1 = m1(k)
-            x2 = m2(k)
-            x3 = m3(k)
-            sizes = (0.25_wp*abs(x1) + 0.25_wp*abs(x2)) + (0.25_wp*abs(x3) + total(l))
-            sizes = merge(plain_largest, sizes, ieee_is_nan(sizes))
-            m(l, 1) = merge(x1, 0.0_wp, sizes < 0.25_wp*plain_largest)
-            m(l, 2) = merge(x2, 0.0_wp, sizes < 0.25_wp*plain_largest)
-            m(l, 3) = merge(x3, 0.0_wp, sizes < 0.25_wp*plain_largest)
-        end do
-        m(count + 1:full, 1) = m(count, 1)
-        m(count + 1:full, 2) = m(count, 2)
-        m(count + 1:full, 3) = m(count, 3)
-    end subroutine load_momenta
-
-    !> The lanes whose bodies or times are not plain get the momentum 0.
-    pure subroutine stop_lanes(full, lane, m)
-        integer, intent(in) :: full
-        real(wp), intent(in) :: lane(lanes)
-        real(wp), intent(inout) :: m(lanes, 3)
-        integer :: l
-
-        do l = 1, full
-            if (.not. abs(lane(l)) > 0.5_wp) m(l, :) = 0.0_wp
-        end do
-    end subroutine stop_lanes
+            if (done == class) then
+                call scatter(number, n, block%column, work, ldm, ldq, m, q, m1, m2, m3, q0, q1, q2, q3)
+            else
+                do l = 1, n
+                    call flow_single(body, h, number(l), ldm, ldq, m1, m2, m3, refused, q0, q1, q2, q3)
+                end do
+            end if
+        end associate
+    end subroutine flow_class
 
     !> Body number k by itself.
     subroutine flow_single(body, h, k, ldm, ldq, m1, m2, m3, refused, q0, q1, q2, q3)
@@ -247,39 +247,7 @@ contains
         refused = max(refused, code)
     end subroutine flow_single
 
-    !> The momenta m + d of lanes from `low` to `high`.
-    pure subroutine add(first, low, high, m, d1, d2, d3, ldm, m1, m2, m3)
-        integer, intent(in) :: first, low, high
-        integer(c_size_t), intent(in) :: ldm
-        real(wp), intent(in) :: m(lanes, 3), d1(lanes), d2(lanes), d3(lanes)
-        real(wp), intent(inout) :: m1(0:*), m2(0:*), m3(0:*)
-        integer(c_size_t) :: k
-        integer :: l
-
-        !GCC$ ivdep
-        do l = low, high
-            k = (first - 2 + l)*ldm
-            m1(k) = m(l, 1) + d1(l)
-            m2(k) = m(l, 2) + d2(l)
-            m3(k) = m(l, 3) + d3(l)
-        end do
-    end subroutine add
-
-    !> The attitudes q + q w of lanes from `low` to `high`.
-    pure subroutine turn_attitudes(first, low, high, w0, w1, w2, w3, ldq, q0, q1, q2, q3)
-        integer, intent(in) :: first, low, high
-        integer(c_size_t), intent(in) :: ldq
-        real(wp), intent(in) :: w0(lanes), w1(lanes), w2(lanes), w3(lanes)
-        real(wp), intent(inout) :: q0(0:*), q1(0:*), q2(0:*), q3(0:*)
-        integer(c_size_t) :: k
-        integer :: l
-
-        !GCC$ ivdep
-        do l = low, high
-            k = (first - 2 + l)*ldq
-            call turn(w0(l), w1(l), w2(l), w3(l), q0(k), q1(k), q2(k), q3(k))
-        end do
-    end subroutine turn_attitudes
+    include 'block_states.inc'
 
     include 'turn_formulas.inc'
 

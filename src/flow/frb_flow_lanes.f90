@@ -30,7 +30,8 @@ module frb_flow_lanes
     public :: lanes, vector, classes, limits, angle_as_size, lane_bodies, workspace, measure, step_lanes
 
     integer, parameter :: lanes = 64    !! bodies in a block
-    integer, parameter :: vector = 8    !! blocks are filled to whole vectors: no loop ends with a part
+    !> Blocks are filled to whole vectors: compilers may round otherwise in what is left of a loop.
+    integer, parameter :: vector = 8
 
     !> Size of a step: max(p, r) and, in the same unit, the square of the half angle.
     real(wp), parameter :: angle_as_size = 0.16_wp
@@ -130,7 +131,7 @@ contains
                 call short_series(work%p(l) + work%r(l), work%p(l)*work%r(l), work%y(l), scd)
             end do
         case default
-            farthest = maxval(work%size(:n))
+            farthest = maxval(work%size(:n), work%size(:n) <= limits(class))
             do l = 1, n
                 part = merge(0.25_wp, 0.125_wp, work%size(l) <= 16*middle_limit)
                 part = merge(0.5_wp, part, work%size(l) <= 4*middle_limit)
@@ -242,7 +243,7 @@ contains
         end do
     end subroutine short_angles
 
-    !> As short_angles, for middle steps.
+    !> As short_angles, for middle steps. In two loops, each so short that several vectors are in work.
     pure subroutine middle_angles(n, of, work)
         integer, intent(in) :: n
         type(lane_bodies), intent(in) :: of
@@ -253,8 +254,11 @@ contains
         do l = 1, n
             y = work%y(l)
             nu = work%nu(l)*y
-            angle = work%part(l)*merge(of%first(l), of%last(l), work%form(l) > 0) - work%form(l)*of%b(l) &
-                    *(nu*(sqrt(y)*middle_third_kind(work%p(l)*y, work%r(l)*y, nu)))
+            work%tn(l) = work%part(l)*merge(of%first(l), of%last(l), work%form(l) > 0) &
+                         - work%form(l)*of%b(l)*(nu*(sqrt(y)*middle_third_kind(work%p(l)*y, work%r(l)*y, nu)))
+        end do
+        do l = 1, n
+            angle = work%tn(l)
             xx = angle*(angle*work%gg(l))
             work%tn(l) = angle*(1 - xx*(7/51.0_wp - xx*(1/255.0_wp - xx*(2/69615.0_wp &
                          - xx*(1/34459425.0_wp)))))

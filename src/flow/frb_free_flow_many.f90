@@ -33,7 +33,7 @@ module frb_free_flow_many
         module procedure columns_of_bodies_at_times
     end interface free_flow_columns
 
-    integer, parameter :: chunk = 64    !! matrices turned at a time
+    integer, parameter :: chunk = 1024      !! matrices turned at a time
 
 contains
 
@@ -185,7 +185,7 @@ contains
         if (any(size(core) == [1, n]) .and. any(size(h) == [1, n]) .and. all(shape(m) == [3, n]) &
             .and. all(shape(a) == [3, 3, n])) then
             code = status_ok
-            !$omp parallel do if (n >= 64*chunk) private(q, last, count, b, t, i, refused) &
+            !$omp parallel do if (n >= 4*chunk) private(q, last, count, b, t, i, refused) &
             !$omp& reduction(max: code)
             do first = 1, n, chunk
                 count = min(chunk, n - first + 1)
