@@ -2,12 +2,13 @@
 module frb_flow_bodies
     use frb_flow_blocks, only: block_of_bodies, set_bodies, step_block, find_classes, whole
     use frb_flow_lanes, only: lanes, classes, workspace
-    use frb_flow_limits, only: plain_largest, plain_smallest
+    use frb_flow_limits, only: largest_bits, smallest_bits
     use frb_flow_one, only: flow_body
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
     use frb_status, only: return_or_stop, status_ok, status_bad_count, status_bad_time
-    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_is_nan
+    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+    use, intrinsic :: iso_fortran_env, only: int64
     use, intrinsic :: iso_c_binding, only: c_size_t
     implicit none
     private

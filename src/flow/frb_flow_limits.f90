@@ -2,12 +2,14 @@
 !> P, R: the squares of the two frequencies, nu: the parameter of the third kind; t: the half step or a part.
 module frb_flow_limits
     use frb_kinds, only: wp
+    use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
 
     public :: most_halvings
     public :: short_limit, tiny_limit, tiny_turn_limit, small_turn_limit, middle_limit, middle_turn_limit
     public :: square_limit, period_limit, smallest_denominator, sin_cos_limit, plain_largest, plain_smallest
+    public :: largest_bits, smallest_bits
     public :: separatrix, settled
     public :: tiny_step, short_step, middle_step, beyond_series
 
@@ -29,5 +31,9 @@ module frb_flow_limits
     real(wp), parameter :: sin_cos_limit = 1.5e6_wp     !! largest argument of sin_cos
     real(wp), parameter :: plain_largest = 1.0e75_wp    !! components whose squares and products are safe
     real(wp), parameter :: plain_smallest = 1.0e-75_wp
+    !> Their bit patterns: those of numbers >= 0 have the order of the numbers, Inf and NaN above all, and to
+    !> compare them raises no floating-point flag and takes less time in lanes.
+    integer(int64), parameter :: largest_bits = transfer(plain_largest, 1_int64)
+    integer(int64), parameter :: smallest_bits = transfer(plain_smallest, 1_int64)
 
 end module frb_flow_limits

@@ -8,9 +8,8 @@
 module frb_flow_tangent_lanes
     use frb_flow_lanes, only: limits, angle_as_size
     use frb_flow_limits, only: short_limit, middle_limit, small_turn_limit, middle_turn_limit, period_limit, &
-        sin_cos_limit, plain_largest, plain_smallest
+        sin_cos_limit, largest_bits, smallest_bits
     use frb_kinds, only: wp
-    use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
     use, intrinsic :: iso_fortran_env, only: int64
     implicit none
     private
@@ -53,11 +52,11 @@ contains
         real(wp), intent(in) :: m(3, lanes), q(4, lanes)
         type(lane_orbits), intent(inout) :: it
         integer, intent(out) :: many(kinds)         !! number of lanes of each kind
-        real(wp) :: x(lanes, 3), smallest(lanes), n1, n2, n3, q0, q1, q2, q3, size_m, size_q
-        integer(int64) :: plain
+        real(wp) :: x(lanes, 3), n1, n2, n3, q0, q1, q2, q3, size_m, size_q
+        integer(int64) :: above, below, plain(lanes), all_plain     !! >= 0: plain
         integer :: l
 
-        plain = 0
+        all_plain = 0
         do l = 1, lanes
             n1 = m(1, l)
             n2 = m(2, l)
@@ -66,13 +65,12 @@ contains
             q1 = q(2, l)
             q2 = q(3, l)
             q3 = q(4, l)
-            size_m = 0.25_wp*abs(n1) + (0.25_wp*abs(n2) + 0.25_wp*abs(n3))
-            size_q = (0.25_wp*abs(q0) + 0.25_wp*abs(q1)) + (0.25_wp*abs(q2) + 0.25_wp*abs(q3))
-            size_m = merge(plain_largest, size_m, ieee_is_nan(size_m))      ! comparing a NaN raises a flag
-            size_q = merge(plain_largest, size_q, ieee_is_nan(size_q))
-            size_q = merge(min(size_m, size_q), 0.0_wp, max(size_m, size_q) < plain_largest)
-            plain = plain + merge(1_int64, 0_int64, size_q > plain_smallest)
-            smallest(l) = size_q
+            size_m = 0.125_wp*abs(n1) + (0.125_wp*abs(n2) + 0.125_wp*abs(n3))
+            size_q = (0.125_wp*abs(q0) + 0.125_wp*abs(q1)) + (0.125_wp*abs(q2) + 0.125_wp*abs(q3))
+            above = ior(transfer(size_m, above) - smallest_bits, transfer(size_q, above) - smallest_bits)
+            below = largest_bits - transfer(size_m + size_q, below)
+            plain(l) = ior(above, below)
+            all_plain = ior(all_plain, plain(l))
             x(l, 1) = n1
             x(l, 2) = n2
             x(l, 3) = n3
@@ -81,9 +79,9 @@ contains
             it%q(l, 3) = q2
             it%q(l, 4) = q3
         end do
-        if (plain < lanes) then
+        if (all_plain < 0) then
             do l = 1, lanes
-                if (smallest(l) > plain_smallest) cycle
+                if (plain(l) >= 0) cycle
                 x(l, :) = 0.0_wp
                 it%q(l, :) = 1.0_wp
             end do
