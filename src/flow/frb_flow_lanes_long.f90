@@ -261,4 +261,6 @@ contains
 
     include 'all_doublings.inc'
 
+    include 'middle_coefficients.inc'
+
 end module frb_flow_lanes_long

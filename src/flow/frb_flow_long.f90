@@ -202,4 +202,6 @@ contains
 
     include 'body_doublings.inc'
 
+    include 'middle_coefficients.inc'
+
 end module frb_flow_long

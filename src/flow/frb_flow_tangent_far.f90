@@ -308,6 +308,8 @@ contains
 
     include 'all_doublings.inc'
 
+    include 'middle_polynomials.inc'
+
     include 'tangent_turn_formulas.inc'
 
     include 'tangent_middle_formulas.inc'

@@ -285,6 +285,8 @@ contains
 
     include 'body_doublings.inc'
 
+    include 'middle_polynomials.inc'
+
     include 'tangent_formulas.inc'
 
     include 'tangent_turn_formulas.inc'

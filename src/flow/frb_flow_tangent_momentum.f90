@@ -83,7 +83,7 @@ contains
 
     include 'tangent_step_momentum.inc'
 
-    include 'middle_coefficients.inc'
+    include 'middle_polynomials.inc'
 
     include 'tangent_middle_formulas.inc'
 

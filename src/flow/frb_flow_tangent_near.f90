@@ -18,7 +18,7 @@ module frb_flow_tangent_near
         real(wp), dimension(lanes) :: l11, l12, l13, l21, l22, l23, l31, l32, l33
         real(wp), dimension(lanes) :: psi, cotangent, slope         !! turn_rate
         real(wp), dimension(lanes) :: kappa, r1, r2, r3             !! kappa_1, grad rho
-        real(wp), dimension(lanes) :: y1, y2, y3, twice, k1, k2, k3, e1, e2, e3     !! turn_of_middle; m'
+        real(wp), dimension(lanes) :: w0, y1, y2, y3, twice, e1, e2, e3     !! turn_of_middle; m'
     end type series_lanes
 
 contains
@@ -56,7 +56,7 @@ contains
             call find_momenta(body, of, it, m(o(1)), m(o(2)), m(o(3)))
             call set_attitudes(it, of%q(:, 1), of%q(:, 1 + o(1)), of%q(:, 1 + o(2)), of%q(:, 1 + o(3)), &
                                q(1), q(1 + o(1)), q(1 + o(2)), q(1 + o(3)))
-            call set_turns(it, phi(j(1, 1)), phi(j(2, 1)), phi(j(3, 1)), phi(j(1, 2)), phi(j(2, 2)), &
+            call set_turns(body, it, phi(j(1, 1)), phi(j(2, 1)), phi(j(3, 1)), phi(j(1, 2)), phi(j(2, 2)), &
                            phi(j(3, 2)), phi(j(1, 3)), phi(j(2, 3)), phi(j(3, 3)), &
                            phi(w(1, 1)), phi(w(2, 1)), phi(w(3, 1)), phi(w(1, 2)), phi(w(2, 2)), &
                            phi(w(3, 2)), phi(w(1, 3)), phi(w(2, 3)), phi(w(3, 3)), &
@@ -173,13 +173,12 @@ contains
         type(lane_orbits), intent(in) :: of
         type(series_lanes), intent(inout) :: it
         real(wp), intent(inout), dimension(of_m) :: n1, n2, n3
-        real(wp) :: d1, d2, d3, twice
+        real(wp) :: d1, d2, d3
         integer :: l
 
         do l = 1, lanes
             call turn_of_middle(body%a, body%b, body%g, it%l1(l), it%l2(l), it%l3(l), it%kappa(l), it%y(l), &
-                                it%scd(l), it%y1(l), it%y2(l), it%y3(l), twice, it%k1(l), it%k2(l), &
-                                it%k3(l), d1, d2, d3)
+                                it%scd(l), it%y1(l), it%y2(l), it%y3(l), it%w0(l), it%twice(l), d1, d2, d3)
             d1 = of%m1(l) + d1
             d2 = of%m2(l) + d2
             d3 = of%m3(l) + d3
@@ -189,10 +188,6 @@ contains
             n1(3*l - 2) = d1
             n2(3*l - 2) = d2
             n3(3*l - 2) = d3
-            it%twice(l) = twice
-            it%r1(l) = twice*it%r1(l)
-            it%r2(l) = twice*it%r2(l)
-            it%r3(l) = twice*it%r3(l)
         end do
     end subroutine find_momenta
 
@@ -303,7 +298,7 @@ contains
             y1 = it%y1(l)
             y2 = it%y2(l)
             y3 = it%y3(l)
-            w0 = norm_change(y1*y1 + (y2*y2 + y3*y3))
+            w0 = it%w0(l)
             q0 = b0(l)
             q1 = b1(l)
             q2 = b2(l)
@@ -314,14 +309,15 @@ contains
     end subroutine set_attitudes
 
     !> W, E, and J = E + m' x W.
-    pure subroutine set_turns(it, j11, j21, j31, j12, j22, j32, j13, j23, j33, &
+    pure subroutine set_turns(body, it, j11, j21, j31, j12, j22, j32, j13, j23, j33, &
                               w11, w21, w31, w12, w22, w32, w13, w23, w33, &
                               e11, e21, e31, e12, e22, e32, e13, e23, e33)
+        type(lane_body), intent(in) :: body
         type(series_lanes), intent(in) :: it
         real(wp), intent(inout), dimension(of_phi) :: j11, j21, j31, j12, j22, j32, j13, j23, j33
         real(wp), intent(inout), dimension(of_phi) :: w11, w21, w31, w12, w22, w32, w13, w23, w33
         real(wp), intent(inout), dimension(of_phi) :: e11, e21, e31, e12, e22, e32, e13, e23, e33
-        real(wp) :: m1, m2, m3, x11, x21, x31, x12, x22, x32, x13, x23, x33
+        real(wp) :: twice, m1, m2, m3, x11, x21, x31, x12, x22, x32, x13, x23, x33
         real(wp) :: z11, z21, z31, z12, z22, z32, z13, z23, z33
         integer :: l
 
@@ -329,12 +325,14 @@ contains
             m1 = it%e1(l)
             m2 = it%e2(l)
             m3 = it%e3(l)
-            call turn_at_end(it%twice(l), it%y1(l), it%y2(l), it%y3(l), &
+            twice = it%twice(l)
+            call turn_at_end(twice, it%y1(l), it%y2(l), it%y3(l), &
                              z11, z12, z13, z21, z22, z23, z31, z32, z33)
-            call turn_by_momentum(it%k1(l), it%k2(l), it%k3(l), it%y1(l), it%y2(l), it%y3(l), it%l1(l), &
-                                  it%l2(l), it%l3(l), it%r1(l), it%r2(l), it%r3(l), &
-                                  it%l11(l), it%l12(l), it%l13(l), it%l21(l), it%l22(l), it%l23(l), &
-                                  it%l31(l), it%l32(l), it%l33(l), &
+            call turn_by_momentum(twice*it%kappa(l), twice*(it%kappa(l) - body%g), &
+                                  twice*(it%kappa(l) - body%b), it%y1(l), it%y2(l), it%y3(l), &
+                                  it%l1(l), it%l2(l), it%l3(l), twice*it%r1(l), twice*it%r2(l), &
+                                  twice*it%r3(l), it%l11(l), it%l12(l), it%l13(l), it%l21(l), it%l22(l), &
+                                  it%l23(l), it%l31(l), it%l32(l), it%l33(l), &
                                   x11, x12, x13, x21, x22, x23, x31, x32, x33)
             e11(36*l - 35) = z11
             e21(36*l - 35) = z21
@@ -372,7 +370,7 @@ contains
 
     include 'middle_formulas.inc'
 
-    include 'middle_coefficients.inc'
+    include 'middle_polynomials.inc'
 
     include 'middle_third_kind.inc'
 

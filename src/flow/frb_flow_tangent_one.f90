@@ -207,6 +207,8 @@ contains
 
     include 'all_series.inc'
 
+    include 'middle_polynomials.inc'
+
     include 'turn_formulas.inc'
 
     include 'reach_formulas.inc'
