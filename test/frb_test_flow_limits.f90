@@ -4,7 +4,7 @@ module frb_test_flow_limits
     use frb_checks, only: tally, worst_of
     use frb_flow_samples, only: stream, true_case, advanced, made_finite, near_separatrix, defect, no_turn, &
         no_rotation
-    use frb_free_flow, only: free_flow, rigid_body
+    use frb_free_flow, only: free_flow, flow_tangent, rigid_body
     use frb_kinds, only: wp, qp, has_quad
     use frb_reference_cases, only: reference_case, score_momentum, score_attitude
     use frb_rotations, only: norm3
@@ -24,7 +24,7 @@ contains
     subroutine test_flow_limits(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('flow-limits', 26)
+        call t%open_suite('flow-limits', 28)
         call check_sphere(t)
         call check_symmetric_tops(t)
         call check_axes(t)
@@ -149,16 +149,16 @@ contains
         end do
     end subroutine check_axes
 
-    !> Deviations from the unstable axis over many decay times, alone and in lanes: from 1e-104 on, where
-    !> squares of the triple and of the momentum at mid-step could underflow; along the directions that
-    !> approach and leave the axis, where the momentum at mid-step is a small difference.
+    !> Deviations from the unstable axis over many decay times, alone and in lanes, with derivatives too: from
+    !> 1e-104 on, where squares of the triple and of the momentum at mid-step could underflow; along the
+    !> directions that approach and leave the axis, where the momentum at mid-step is a small difference.
     subroutine check_tiny_deviations(t)
         type(tally), intent(inout) :: t
         real(wp), parameter :: moments(3) = [0.6_wp, 0.8_wp, 1.0_wp]
         real(wp), parameter :: ratio = sqrt(5/3.0_wp)       ! m3/m1 on the separatrix
         type(stream) :: random
         type(rigid_body) :: body
-        real(wp) :: m0(3), h, worst(2), m(3, 8), q(4, 8)
+        real(wp) :: m0(3), h, worst(4), m(3, 32), q(4, 32), transition(6, 6, 32)
         integer :: i
 
         body = rigid_body(moments)
@@ -174,13 +174,22 @@ contains
             m0(2) = 1.0_wp
             h = random%uniform(0.0_wp, 2500.0_wp)
             worst(1) = worst_of(worst(1), defect(moments, m0, advanced(moments, m0, h)))
-            m = spread(m0, 2, 8)
-            q = spread(no_turn, 2, 8)
-            call free_flow(body, h, m, q)
+            m = spread(m0, 2, 32)
+            q = spread(no_turn, 2, 32)
+            call free_flow(body, h, m(:, :8), q(:, :8))
+            call flow_tangent(body, h, m(:, 9), q(:, 9), transition(:, :, 9))
             worst(2) = worst_of(worst(2), defect(moments, m0, made_finite([m(:, 5), q(:, 5)])))
+            worst(3) = worst_of(worst(3), defect(moments, m0, made_finite([m(:, 9), q(:, 9)])))
+            if (mod(i, 8) > 1) cycle
+            m = spread(m0, 2, 32)
+            q = spread(no_turn, 2, 32)
+            call flow_tangent(body, h, m, q, transition)
+            worst(4) = worst_of(worst(4), defect(moments, m0, made_finite([m(:, 5), q(:, 5)])))
         end do
         call t%at_most('next-to-the-unstable-axis-the-motion-stays-on-its-orbit', worst(1), 1.0e-12_wp)
         call t%at_most('next-to-the-unstable-axis-so-it-does-in-lanes', worst(2), 1.0e-12_wp)
+        call t%at_most('next-to-the-unstable-axis-so-it-does-with-derivatives', worst(3), 1.0e-12_wp)
+        call t%at_most('next-to-the-unstable-axis-so-it-does-with-derivatives-in-lanes', worst(4), 1.0e-12_wp)
     end subroutine check_tiny_deviations
 
     !> I = 2, 3, 6 and |m1| = |m3|: the separatrix to the last bit. m2 = |m| tanh(kappa), m1 and m3 fall as

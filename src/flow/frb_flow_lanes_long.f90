@@ -223,9 +223,10 @@ contains
             d = merge(at%d(l), at%c(l), at%delta(l) <= 0.0_wp)
             at%c(l) = c
             at%d(l) = d
-            call long_momentum(at%delta(l) <= 0, of%a(l), of%b(l), of%g(l), max(at%gg(l), tiny(1.0_wp)), &
-                               at%s(l), c, d, at%z(l), at%m1(l), at%m2(l), at%m3(l), at%n1(l), at%n2(l), &
-                               at%n3(l), at%n0(l), work%d(l, 1), work%d(l, 2), work%d(l, 3))
+            call long_momentum(at%delta(l) <= 0, abs(at%delta(l)), of%a(l), of%b(l), of%g(l), &
+                               max(at%gg(l), tiny(1.0_wp)), at%s(l), c, d, at%z(l), at%m1(l), at%m2(l), &
+                               at%m3(l), at%n1(l), at%n2(l), at%n3(l), at%n0(l), work%d(l, 1), &
+                               work%d(l, 2), work%d(l, 3))
         end do
     end subroutine move
 

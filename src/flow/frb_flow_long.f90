@@ -81,7 +81,7 @@ contains
         c = turned*c
         cp = merge(c, d, cn_is_c)
         dr = merge(d, c, cn_is_c)
-        call long_momentum(cn_is_c, a, b, g, gg, s, cp, dr, z, m1, m2, m3, n1, n2, n3, n0, d1, d2, d3)
+        call long_momentum(cn_is_c, delta, a, b, g, gg, s, cp, dr, z, m1, m2, m3, n1, n2, n3, n0, d1, d2, d3)
         m(i1) = keep*m1 + d1
         m(i2) = keep*m2 + d2
         m(i3) = body%parity*(keep*m3 + d3)
@@ -175,7 +175,7 @@ contains
     end subroutine turn_far
 
     !> Whole periods: see remove_periods; `whole` is the integral of the third kind over them. On the
-    !> separatrix (delta <= 1e-200 pmax) there are no periods: after 60 units of 1/lambda the motion has
+    !> separatrix (delta <= 1e-200 pmax) there are no periods: after 100 units of 1/lambda the motion has
     !> reached the middle axis to all digits, and then turns uniformly.
     pure subroutine reduce_periods(pmax, delta, nu, with_whole, fraction, turned, whole)
         real(wp), intent(in) :: pmax, delta, nu

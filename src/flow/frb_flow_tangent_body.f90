@@ -32,7 +32,7 @@ contains
         real(wp), intent(inout) :: m(3)
         integer, intent(out) :: code
         real(wp), intent(inout) :: jacobian(3, 3)
-        real(wp) :: size_m
+        real(wp) :: size_m, reached
         logical :: plain, done
 
         code = body%status
@@ -44,10 +44,17 @@ contains
             if (done) return
             plain = (body%a(1)*h)**2*(m(1)*m(1) + m(2)*m(2) + m(3)*m(3)) <= largest_square_angle
         end if
-        if (plain) then
-            call tangent_beyond(body, h, m, 0, jacobian=jacobian)
-        else
+        if (.not. plain) then
             call tangent_body(body, h, m, code, 0, jacobian=jacobian)
+            return
+        end if
+        ! The common case of tangent_beyond.
+        reached = 1.0_wp
+        call long_tangent(body, 0.5_wp*h, m, reached, jacobian=jacobian)
+        if (reached < 1.0_wp) then
+            call tangent_beyond(body, h, m, 0, jacobian=jacobian)
+        else if (body%parity < 0.0_wp) then
+            call reflect(int(body%order(3)), jacobian=jacobian)
         end if
     end subroutine jacobian_body
 
@@ -164,6 +171,7 @@ contains
         real(wp) :: reached, part
 
         part = h
+        reached = 1.0_wp
         call long_tangent(body, 0.5_wp*part, m, reached, parts, q, transition, jacobian)
         if (reached < 1.0_wp) then
             part = reached*h

@@ -224,8 +224,8 @@ contains
             d = merge(at%d(l), at%c(l), c_is_cn)
             it%c(l) = c
             ends%d(l) = d
-            call long_momentum(c_is_cn, of%a(l), b, of%g(l), of%gg(l), at%s(l), c, d, 1.0_wp, of%m1(l), &
-                               of%m2(l), of%m3(l), n1, n2, n3, n0, d1, d2, d3)
+            call long_momentum(c_is_cn, it%delta(l), of%a(l), b, of%g(l), of%gg(l), at%s(l), c, d, 1.0_wp, &
+                               of%m1(l), of%m2(l), of%m3(l), n1, n2, n3, n0, d1, d2, d3)
             ends%e1(l) = of%m1(l) + d1
             ends%e2(l) = of%m2(l) + d2
             ends%e3(l) = of%m3(l) + d3

@@ -28,12 +28,13 @@ contains
 
     !> Advances m, and q when present, by 2 t, and forms `transition`, or `jacobian` without q. m /= 0,
     !> all numbers plain. On the separatrix (delta <= 1e-200 pmax) the motion may reach the middle axis to all
-    !> digits before this time: then nothing is done, and `reached` < 1 is the part of the time until then.
+    !> digits before this time: then nothing is done, and `reached`, 1 on entry, is the part of the time until
+    !> then. With `reached` < 1 on entry the motion is on the separatrix, whatever delta is for this time.
     pure subroutine long_tangent(body, t, m, reached, parts, q, transition, jacobian)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: t
         real(wp), intent(inout) :: m(3)
-        real(wp), intent(out) :: reached
+        real(wp), intent(inout) :: reached
         type(step_parts), intent(inout), optional :: parts  !! for derivatives by the inertia
         real(wp), intent(inout), optional :: q(4)
         real(wp), intent(inout), optional :: transition(6, 6)
@@ -44,8 +45,7 @@ contains
         real(wp) :: g1, g2, g3
         real(wp) :: r11, r12, r13, r22, r23, r33, j11, j12, j13, j21, j22, j23, j31, j32, j33, cosine, sine
 
-        call set_orbit(body, t, m, present(q), f, it)
-        reached = 1.0_wp
+        call set_orbit(body, t, m, present(q), reached < 1.0_wp, f, it)
         if (it%pmax > settled**2 .and. it%delta <= separatrix*it%pmax) then
             reached = 0.99_wp*settled/sqrt(it%pmax)
             return
@@ -55,7 +55,7 @@ contains
         sine = 0.0_wp
         if (present(q)) call uniform_turn(f, it, cosine, sine)
         call double_up(f, it, present(q))
-        call advance_momentum(f, m)
+        call advance_momentum(f, it%delta, m)
         if (present(q)) call advance_attitude(f, it, cosine, sine, q, transition)
         call phase_terms(f%c_is_cn, f%a, f%b, f%g, f%m1, f%m2, f%m3, f%n2, f%n3, f%s, f%c, f%d, x, yy, &
                          twice, over_d0, xg, yd, ye)
@@ -99,10 +99,10 @@ contains
 
     !> The constants of the motion in the form with the smaller nu, and the part of the half step that remains
     !> without whole periods.
-    pure subroutine set_orbit(body, t, m, with_attitude, f, it)
+    pure subroutine set_orbit(body, t, m, with_attitude, on_separatrix, f, it)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: t, m(3)
-        logical, intent(in) :: with_attitude
+        logical, intent(in) :: with_attitude, on_separatrix
         type(step_parts), intent(out) :: f
         type(doubling_state), intent(out) :: it
         real(wp) :: mirror, span
@@ -111,7 +111,7 @@ contains
         call set_constants(body, t, m, f, mirror)
         it%delta = orbit_difference(f%a, f%b, f%g, f%m1, f%m3)
         f%c_is_cn = it%delta <= 0.0_wp
-        it%delta = abs(it%delta)
+        it%delta = merge(0.0_wp, abs(it%delta), on_separatrix)
         it%pmax = max(f%p, f%r)
         it%pmin = min(f%p, f%r)
         call choose_form(body, t, mirror, f)
@@ -235,13 +235,14 @@ contains
     end subroutine double_up
 
     !> m at mid-step and at the end.
-    pure subroutine advance_momentum(f, m)
+    pure subroutine advance_momentum(f, delta, m)
         type(step_parts), intent(inout) :: f
+        real(wp), intent(in) :: delta
         real(wp), intent(inout) :: m(3)
         real(wp) :: n0, d1, d2, d3, over
 
-        call long_momentum(f%c_is_cn, f%a, f%b, f%g, f%gg, f%s, f%c, f%d, 1.0_wp, f%m1, f%m2, f%m3, f%n1, &
-                           f%n2, f%n3, n0, d1, d2, d3)
+        call long_momentum(f%c_is_cn, delta, f%a, f%b, f%g, f%gg, f%s, f%c, f%d, 1.0_wp, f%m1, f%m2, f%m3, &
+                           f%n1, f%n2, f%n3, n0, d1, d2, d3)
         call end_momentum(d1, d2, d3, f, m)
         over = 1/n0
         f%n1 = f%n1*over
