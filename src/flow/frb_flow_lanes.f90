@@ -37,7 +37,7 @@ module frb_flow_lanes
     real(wp), parameter :: angle_as_size = 0.16_wp
     !> Tiny, short and middle steps, and those of frb_flow_lanes_long, by the largest size of each.
     integer, parameter :: classes = 4
-    real(wp), parameter :: limits(0:classes) = [-1.0_wp, 8.0e-5_wp, short_limit, 26*middle_limit, &
+    real(wp), parameter :: limits(0:classes) = [-1.0_wp, 1.6e-4_wp, short_limit, 26*middle_limit, &
                                                 period_limit]
 
     real(wp), parameter :: smallest_square = plain_smallest**2, no_lane = 1.0e300_wp    !! goes one by one
@@ -311,7 +311,7 @@ contains
         end do
     end subroutine double_lane_angles
 
-    !> The turn (X0, V) up to its norm, then divided by it, less 1.
+    !> The turn (X0, V) up to its norm, then divided by it, less 1. In two short loops.
     pure subroutine turn_lanes(n, of, work)
         integer, intent(in) :: n
         type(lane_bodies), intent(in) :: of
@@ -331,7 +331,16 @@ contains
             v1 = (f + merge(0.0_wp, u, work%form(l) > 0))*work%n1(l)
             v2 = (f + merge(-g, a, work%form(l) > 0)*x0)*work%n2(l)
             v3 = (f - merge(u, 0.0_wp, work%form(l) > 0))*work%n3(l)
-            x0 = x0*work%d0(l)
+            work%w0(l) = x0*work%d0(l)
+            work%w(l, 1) = v1
+            work%w(l, 2) = v2
+            work%w(l, 3) = v3
+        end do
+        do l = 1, n
+            x0 = work%w0(l)
+            v1 = work%w(l, 1)
+            v2 = work%w(l, 2)
+            v3 = work%w(l, 3)
             square = v1*v1 + (v2*v2 + v3*v3)
             norm = sqrt(x0*x0 + square)
             u = norm + abs(x0)

@@ -6,7 +6,7 @@
 !> a constant distance between bodies: so a block may have its axes in any order. Half the time of short steps
 !> goes into these stores; to gather a body's numbers first and to copy them takes longer (AVX2).
 module frb_flow_tangent_lanes
-    use frb_flow_lanes, only: limits, angle_as_size
+    use frb_flow_lanes, only: angle_as_size
     use frb_flow_limits, only: short_limit, middle_limit, small_turn_limit, middle_turn_limit, period_limit, &
         sin_cos_limit, largest_bits, smallest_bits
     use frb_kinds, only: wp
@@ -23,6 +23,7 @@ module frb_flow_tangent_lanes
 
     !> The kinds of steps: by the first terms of series, by short or middle series, by doublings.
     integer, parameter :: tiny = 1, short = 2, middle = 3, far = 4, kinds = 4
+    real(wp), parameter :: tiny_size = 8.0e-5_wp    !! largest size, see frb_flow_lanes, of the first terms
     real(wp), parameter :: no_lane = 5.0_wp     !! not in lanes
 
     !> The body in axes of cyclic order, the middle moment second, times t = h/2. Where the moments ascend in
@@ -99,7 +100,7 @@ contains
         integer, intent(out) :: many(kinds)
         real(wp) :: n1, n2, n3, ab, ag, bg, k, p, r, gg, largest, square, kind
         real(wp) :: most(tiny:middle)           !! largest squares of a half angle of the series
-        real(wp), parameter :: of_triple(tiny:middle) = [limits(1), short_limit, middle_limit]
+        real(wp), parameter :: of_triple(tiny:middle) = [tiny_size, short_limit, middle_limit]
         integer(int64) :: to_tiny, to_short, to_middle, to_far      !! lanes up to each kind
         integer :: l
 
@@ -110,7 +111,7 @@ contains
         ! By |m| alone, p and r being at most |m|^2 times the larger of bg and ab: so bodies with momenta of
         ! one size are of one kind, and their blocks need only one.
         k = max(ab, bg)
-        most = [limits(1)/angle_as_size, small_turn_limit, middle_turn_limit]
+        most = [tiny_size/angle_as_size, small_turn_limit, middle_turn_limit]
         do l = tiny, middle
             if (most(l)*k > of_triple(l)*largest) most(l) = of_triple(l)*largest/k
         end do
