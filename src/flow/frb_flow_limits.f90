@@ -15,7 +15,8 @@ module frb_flow_limits
 
     !> The series that a step of one body uses.
     integer, parameter :: tiny_step = 1, short_step = 2, middle_step = 3, beyond_series = 4
-    !> A bound for NaN, where a compiler assumes that there is none: 11 are needed after settled times.
+    !> Most halvings of a time. 12 are needed; the bound ends a loop where a compiler assumes that there is no
+    !> NaN.
     integer, parameter :: most_halvings = 16
     real(wp), parameter :: short_limit = 0.002_wp       !! largest max(P, R) (h/2)^2 of the short series
     real(wp), parameter :: tiny_limit = 1.0e-4_wp       !! largest max(P, R) (h/2)^2 of its first terms alone
@@ -26,7 +27,7 @@ module frb_flow_limits
     real(wp), parameter :: square_limit = 0.8_wp        !! largest max(P, R) t^2 to which s^2 alone is doubled
     real(wp), parameter :: period_limit = 1024.0_wp     !! max(P, R) (h/2)^2 from which periods are taken out
     real(wp), parameter :: separatrix = 1.0e-200_wp     !! |R - P|/max(P, R) that counts as 0
-    real(wp), parameter :: settled = 100.0_wp           !! half step times lambda that ends there on the axis
+    real(wp), parameter :: settled = 200.0_wp           !! half step times lambda that ends on the middle axis
     real(wp), parameter :: smallest_denominator = 1.0e-9_wp    !! of the triple, before a division
     real(wp), parameter :: sin_cos_limit = 1.5e6_wp     !! largest argument of sin_cos
     real(wp), parameter :: plain_largest = 1.0e75_wp    !! components whose squares and products are safe

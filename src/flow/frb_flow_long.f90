@@ -175,7 +175,7 @@ contains
     end subroutine turn_far
 
     !> Whole periods: see remove_periods; `whole` is the integral of the third kind over them. On the
-    !> separatrix (delta <= 1e-200 pmax) there are no periods: after 100 units of 1/lambda the motion has
+    !> separatrix (delta <= 1e-200 pmax) there are no periods: after 200 units of 1/lambda the motion has
     !> reached the middle axis to all digits, and then turns uniformly.
     pure subroutine reduce_periods(pmax, delta, nu, with_whole, fraction, turned, whole)
         real(wp), intent(in) :: pmax, delta, nu

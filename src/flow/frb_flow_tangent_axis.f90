@@ -19,15 +19,15 @@ module frb_flow_tangent_axis
 
 contains
 
-    !> Continues for the time tau from a state on the middle axis; m stays. By the group law Phi(h + tau) =
-    !> Phi(tau) Phi(h). Entries beyond the largest number are Inf, never NaN: terms that grow and terms that
-    !> do not are added last.
+    !> Continues the derivatives for the time tau from a state on the middle axis. By the group law
+    !> Phi(h + tau) = Phi(tau) Phi(h). Entries beyond the largest number are Inf, never NaN: terms that grow
+    !> and terms that do not are added last.
     pure subroutine follow_axis(body, tau, m, elements, q, transition, jacobian, by_inertia)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: tau, m(3)
         include 'tangent_results.inc'
         type(axis_map) :: map
-        real(wp) :: column(6), half(4), p(4)
+        real(wp) :: column(6)
         integer :: k
 
         map = new_map(body, tau, m)
@@ -49,15 +49,6 @@ contains
                 call follow_inertia(body, map, k, by_inertia(:, k))
             end do
         end if
-        ! The turn by a2 m2 tau about the axis.
-        half = 0.0_wp
-        half(1) = cos(0.5_wp*map%a2_tau*map%m2)
-        half(1 + map%o2) = sin(0.5_wp*map%a2_tau*map%m2)
-        p = q
-        q(1) = p(1)*half(1) - (p(2)*half(2) + p(3)*half(3) + p(4)*half(4))
-        q(2) = p(2)*half(1) + (p(1)*half(2) + (p(3)*half(4) - p(4)*half(3)))
-        q(3) = p(3)*half(1) + (p(1)*half(3) + (p(4)*half(2) - p(2)*half(4)))
-        q(4) = p(4)*half(1) + (p(1)*half(4) + (p(2)*half(3) - p(3)*half(2)))
     end subroutine follow_axis
 
     !> cosh and sinh as a power of 2 and factors.

@@ -49,8 +49,7 @@ contains
             return
         end if
         ! The common case of tangent_beyond.
-        reached = 1.0_wp
-        call long_tangent(body, 0.5_wp*h, m, reached, jacobian=jacobian)
+        call long_tangent(body, 0.5_wp*h, m, .false., reached, jacobian=jacobian)
         if (reached < 1.0_wp) then
             call tangent_beyond(body, h, m, 0, jacobian=jacobian)
         else if (body%parity < 0.0_wp) then
@@ -160,28 +159,34 @@ contains
         if (present(by_inertia)) call inertia_columns(body, parts, m, elements, by_inertia)
     end subroutine tangent_plain
 
-    !> As tangent_plain, for steps too long for the series. A motion that reaches the middle axis to all
-    !> digits continues on this axis.
+    !> As tangent_plain, for steps too long for the series. The derivatives of a motion that reaches the
+    !> middle axis to all digits continue on this axis.
     pure subroutine tangent_beyond(body, h, m, elements, q, transition, jacobian, by_inertia)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: h
         real(wp), intent(inout) :: m(3)
         include 'tangent_results.inc'
         type(step_parts) :: parts
-        real(wp) :: reached, part
+        real(wp) :: reached, all_of_it, n(3), p(4)
+        integer :: code
 
-        part = h
-        reached = 1.0_wp
-        call long_tangent(body, 0.5_wp*part, m, reached, parts, q, transition, jacobian)
-        if (reached < 1.0_wp) then
-            part = reached*h
-            call long_tangent(body, 0.5_wp*part, m, reached, parts, q, transition, jacobian)
-            reached = 0.0_wp
-        end if
+        n = m
+        if (present(q)) p = q
+        call long_tangent(body, 0.5_wp*h, m, .false., reached, parts, q, transition, jacobian)
+        ! With another time |R - P| t^2 would be rounded anew, not always to 0.
+        if (reached < 1.0_wp) call long_tangent(body, 0.5_wp*(reached*h), m, .true., all_of_it, parts, q, &
+                                                transition, jacobian)
         if (body%parity < 0.0_wp) call reflect(int(body%order(3)), transition, jacobian)
         if (present(by_inertia)) call inertia_columns(body, parts, m, elements, by_inertia)
-        if (reached < 1.0_wp) call follow_axis(body, h - part, m, elements, q, transition, jacobian, &
-                                               by_inertia)
+        if (reached >= 1.0_wp) return
+        call follow_axis(body, h - reached*h, m, elements, q, transition, jacobian, by_inertia)
+        if (present(q)) then
+            call flow_body(body, h, n, code, p)
+            q = p
+        else
+            call flow_body(body, h, n, code)
+        end if
+        m = n
     end subroutine tangent_beyond
 
     !> Sorted axes are right-handed: after an odd sorting the last axis is reversed.

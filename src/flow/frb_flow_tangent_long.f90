@@ -3,7 +3,7 @@
 !> mean.
 module frb_flow_tangent_long
     use frb_flow_limits, only: most_halvings, middle_limit, square_limit, period_limit, sin_cos_limit, &
-        separatrix, settled
+        separatrix
     use frb_flow_tangent_parts, only: step_parts
     use frb_flow_tangent_periods, only: reduce_periods
     use frb_inertia, only: body_core
@@ -12,6 +12,8 @@ module frb_flow_tangent_long
     private
 
     public :: long_tangent
+
+    real(wp), parameter :: longest = 150.0_wp       !! half step times lambda on the separatrix
 
     !> The state of the doublings. z: common denominator of the triple, by which no doubling divides.
     type :: doubling_state
@@ -27,14 +29,14 @@ module frb_flow_tangent_long
 contains
 
     !> Advances m, and q when present, by 2 t, and forms `transition`, or `jacobian` without q. m /= 0,
-    !> all numbers plain. On the separatrix (delta <= 1e-200 pmax) the motion may reach the middle axis to all
-    !> digits before this time: then nothing is done, and `reached`, 1 on entry, is the part of the time until
-    !> then. With `reached` < 1 on entry the motion is on the separatrix, whatever delta is for this time.
-    pure subroutine long_tangent(body, t, m, reached, parts, q, transition, jacobian)
+    !> all numbers plain. On the separatrix (delta <= 1e-200 pmax, or if the caller knows it) a time can be
+    !> too long: then nothing is done, and `reached` < 1 is the part of it that is not.
+    pure subroutine long_tangent(body, t, m, on_separatrix, reached, parts, q, transition, jacobian)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: t
         real(wp), intent(inout) :: m(3)
-        real(wp), intent(inout) :: reached
+        logical, intent(in) :: on_separatrix
+        real(wp), intent(out) :: reached
         type(step_parts), intent(inout), optional :: parts  !! for derivatives by the inertia
         real(wp), intent(inout), optional :: q(4)
         real(wp), intent(inout), optional :: transition(6, 6)
@@ -45,9 +47,10 @@ contains
         real(wp) :: g1, g2, g3
         real(wp) :: r11, r12, r13, r22, r23, r33, j11, j12, j13, j21, j22, j23, j31, j32, j33, cosine, sine
 
-        call set_orbit(body, t, m, present(q), reached < 1.0_wp, f, it)
-        if (it%pmax > settled**2 .and. it%delta <= separatrix*it%pmax) then
-            reached = 0.99_wp*settled/sqrt(it%pmax)
+        call set_orbit(body, t, m, present(q), on_separatrix, f, it)
+        reached = 1.0_wp
+        if (it%pmax > longest**2 .and. it%delta <= separatrix*it%pmax) then
+            reached = 0.99_wp*longest/sqrt(it%pmax)
             return
         end if
         call first_part(f, present(q), it)
