@@ -4,6 +4,7 @@ module frb_test_flow_scales
     use frb_flow_samples, only: stream, advanced, same_bits, defect, no_rotation
     use frb_free_flow, only: free_flow, rigid_body
     use frb_kinds, only: wp
+    use frb_rotations, only: norm3
     use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
     implicit none
     private
@@ -19,11 +20,36 @@ contains
     subroutine test_flow_scales(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('flow-scales', 17)
+        call t%open_suite('flow-scales', 18)
         call check_scales(t)
         call check_nothing(t)
+        call check_by_tensor(t)
         call t%close_suite()
     end subroutine test_flow_scales
+
+    !> The change of a momentum near the largest number is beyond it. A body by tensor adds this change.
+    subroutine check_by_tensor(t)
+        type(tally), intent(inout) :: t
+        type(stream) :: random
+        type(rigid_body) :: body
+        real(wp) :: m(3), n(3), q(4), p(4), h, worst
+        integer :: i
+
+        body = rigid_body(reshape([2.0_wp, 0.3_wp, 0.1_wp, 0.3_wp, 3.0_wp, 0.2_wp, 0.1_wp, 0.2_wp, 4.0_wp], &
+                                  [3, 3]))
+        worst = 0.0_wp
+        do i = 1, 200
+            m = huge(1.0_wp)*random%uniform(0.5_wp, 0.99_wp)*random%direction()
+            h = random%uniform(0.0_wp, 20.0_wp)/huge(1.0_wp)
+            n = m/1024
+            q = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+            p = q
+            call free_flow(body, h, m, q)
+            call free_flow(body, 1024*h, n, p)
+            worst = worst_of(worst, [abs(m/1024 - n)/norm3(n), abs(q - p)])
+        end do
+        call t%at_most('by-tensor-momenta-near-the-largest-number', worst, 16*eps)
+    end subroutine check_by_tensor
 
     !> Other units, by powers of 2, give the same bits as long as no number is denormal.
     subroutine check_scales(t)

@@ -17,13 +17,15 @@ contains
     !> constants of a sphere, which hold in any axes. For other bodies the momentum is rotated to principal
     !> axes, and only increments are rotated back, so that rounding of the rotation does not add up over many
     !> steps.
-    pure subroutine flow_in_principal_axes(body, h, m, code, q)
+    pure recursive subroutine flow_in_principal_axes(body, h, m, code, q)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: h
         real(wp), intent(inout) :: m(3)
         integer, intent(out) :: code
         real(wp), intent(inout), optional :: q(4)
+        real(wp), parameter :: large = huge(1.0_wp)/16
         real(wp) :: change(3), upright(3), turn(4), size_q
+        logical :: fast
 
         code = status_bad_momentum
         if (.not. all(ieee_is_finite(m))) return
@@ -44,6 +46,16 @@ contains
                 call flow_momentum(body, h, upright, code, 1.0_wp)
             end if
             if (code == status_ok) m = upright
+            return
+        end if
+        fast = maxval(abs(m)) > large
+        if (fast) fast = ieee_is_finite(h)
+        if (fast) fast = abs(h) < large
+        if (fast) then
+            ! The change of m, up to twice as large as m, could overflow.
+            change = 0.125_wp*m
+            call flow_in_principal_axes(body, 8*h, change, code, q)
+            if (code == status_ok) m = 8*change
             return
         end if
         ! The change of m, not rounded to the digits of m: with nearly principal axes the small part that the
