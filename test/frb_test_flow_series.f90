@@ -8,6 +8,7 @@ module frb_test_flow_series
     use frb_kinds, only: rp => wp, has_quad
     use frb_quad_flow_formulas, only: wp, tiny_series, tiny_third_kind, short_series, short_third_kind, &
         middle_series, middle_third_kind, small_turn, short_norm, double_square, double_triple
+    use frb_quad_tangent_formulas, only: middle_integrals
     implicit none
     private
 
@@ -21,8 +22,8 @@ contains
     subroutine test_flow_series(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('flow-series', 10)
-        if (t%provided(has_quad, 9, 'coefficients, which need 30 digits')) call check_coefficients(t)
+        call t%open_suite('flow-series', 11)
+        if (t%provided(has_quad, 10, 'coefficients, which need 30 digits')) call check_coefficients(t)
         call t%at_most('sine-and-cosine-of-any-turn-are-good-to-an-ulp-of-one', turn_error(), epsilon(1.0_rp))
         call t%close_suite()
     end subroutine test_flow_series
@@ -32,8 +33,8 @@ contains
         type(tally), intent(inout) :: t
         real(wp), parameter :: arguments(2, 4) = reshape([0.7_wp, 0.3_wp, 0.1_wp, 0.9_wp, 0.0_wp, 0.8_wp, &
                                                           0.6_wp, 0.6_wp], [2, 4])
-        real(wp) :: s_terms(0:most), y_terms(0:most), p, r, n, s, y, z, scd, c, d, sinc, cosm1
-        real(rp) :: error(9)
+        real(wp) :: s_terms(0:most), y_terms(0:most), p, r, n, s, y, z, scd, c, d, sinc, cosm1, dd, aa, bb
+        real(rp) :: error(10)
         integer :: i, k
 
         error = 0.0_rp
@@ -49,6 +50,10 @@ contains
             error(2) = worst_of(error(2), real(abs(y - sum(y_terms(:5))), rp))
             error(3) = worst_of(error(3), real(abs(scd - sum([((k + 1)*y_terms(k), k=0, 5)])), rp))
             error(4) = worst_of(error(4), real(abs(middle_third_kind(p, r, n) - third_kind(p, r, n, 8)), rp))
+            call middle_integrals(p, r, dd, aa, bb)
+            error(10) = worst_of(error(10), real(abs([dd - third_kind(p, r, 0.0_wp, 8), &
+                                                      aa - third_kind(p, r, -p, 9), &
+                                                      bb - third_kind(p, r, -r, 9)]), rp))
             error(5) = worst_of(error(5), &
                                 real(abs(short_third_kind(p + r, p*r, n) &
                                          - whole_third_kind(y_terms, n, 4)), rp))
@@ -97,6 +102,7 @@ contains
         call t%at_most('s-squared-of-a-short-step-is-its-series-to-degree-5', error(2), rounding)
         call t%at_most('derivative-of-s-squared-is-its-series-to-degree-5', error(3), rounding)
         call t%at_most('integral-of-a-middle-step-is-its-series-to-degree-8', error(4), rounding)
+        call t%at_most('integrals-of-a-middle-step-are-their-series-to-degrees-8-and-9', error(10), rounding)
         call t%at_most('integral-of-a-short-step-is-its-series-to-degree-4', error(5), rounding)
         call t%at_most('doublings-of-the-triple-agree', error(6), rounding)
         call t%at_most('sine-and-cosine-of-a-small-turn-are-their-series', error(7), rounding)
