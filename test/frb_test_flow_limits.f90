@@ -24,11 +24,12 @@ contains
     subroutine test_flow_limits(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('flow-limits', 28)
+        call t%open_suite('flow-limits', 31)
         call check_sphere(t)
         call check_symmetric_tops(t)
         call check_axes(t)
         call check_tiny_deviations(t)
+        call check_separatrix_derivatives(t)
         if (t%provided(has_quad, 3, 'on the separatrix, which needs 30 digits')) call check_separatrix(t)
         if (t%provided(has_quad, 4, 'next to the separatrix, which needs 30 digits')) call check_both_sides(t)
         call t%close_suite()
@@ -192,6 +193,77 @@ contains
         call t%at_most('next-to-the-unstable-axis-so-it-does-with-derivatives', worst(3), 1.0e-12_wp)
         call t%at_most('next-to-the-unstable-axis-so-it-does-with-derivatives-in-lanes', worst(4), 1.0e-12_wp)
     end subroutine check_tiny_deviations
+
+    !> Moments 2, 3, 6 in any order and |m1| = |m3|: the separatrix to the last bit. From close to axis 2 the
+    !> motion approaches it (side = 1), or leaves it and comes close to its other end (side = -1). With r =
+    !> m1'/m1 = m3'/m3, up to terms (m1/|m|)^2, dm is half of a part along (m1, m3), that shifts the motion in
+    !> time and becomes side r times it, and half of a part across, that the energy makes 1/r times it. Steps
+    !> of 20 decay times, counted from the turn, to 700: from 297 on they are joined from two parts.
+    subroutine check_separatrix_derivatives(t)
+        type(tally), intent(inout) :: t
+        real(wp), parameter :: tolerance = 2.0e-12_wp
+        integer, parameter :: orders(3, 6) = reshape([1, 2, 3, 2, 3, 1, 3, 1, 2, 3, 2, 1, 2, 1, 3, 1, 3, 2], &
+                                                     [3, 6])
+        type(stream) :: random
+        type(rigid_body) :: body
+        real(wp) :: moments(3), a(3), m0(3), m(3), q(4), transition(6, 6), by_moments(6, 3), growth
+        real(wp) :: turn, decays, handed, log_r, r, truth(3, 3), worst(3)
+        integer :: i, side, o1, o2, o3, k
+
+        worst = 0.0_wp
+        do i = 1, 3000
+            o1 = orders(1, 1 + mod(i, 6))
+            o2 = orders(2, 1 + mod(i, 6))
+            o3 = orders(3, 1 + mod(i, 6))
+            handed = merge(1, -1, mod(i, 6) < 3)
+            moments([o1, o2, o3]) = [2.0_wp, 3.0_wp, 6.0_wp]
+            a = 1/moments
+            body = rigid_body(moments)
+            side = merge(1, -1, mod(i, 4) == 0)
+            m0(o1) = sign(random%log_uniform(-102.0_wp, -10.0_wp), random%uniform(-1.0_wp, 1.0_wp))
+            m0(o2) = sign(1.0_wp, random%uniform(-1.0_wp, 1.0_wp))
+            turn = log(sqrt(2.0_wp)/abs(m0(o1)))
+            decays = random%uniform(20.0_wp, 670.0_wp)
+            log_r = -decays
+            if (side < 0) then
+                decays = turn + random%uniform(20.0_wp, 620.0_wp - turn)
+                log_r = 2*turn - decays
+            end if
+            r = exp(log_r)
+            decays = sign(decays, random%uniform(-1.0_wp, 1.0_wp))
+            m0(o3) = sign(m0(o1), side*decays*handed*m0(o2)*m0(o1))
+            truth = 0.0_wp
+            truth(o1, o1) = 0.5_wp*(1/r + side*r)
+            truth(o3, o1) = 0.5_wp*(side*r - 1/r)*sign(1.0_wp, m0(o1)*m0(o3))
+            truth(o1, o3) = truth(o3, o1)
+            truth(o3, o3) = truth(o1, o1)
+            ! J m = m' + h dm'/dh
+            truth(:, o2) = (1 - side - abs(decays))*(r/m0(o2))*m0
+            truth(o2, :) = side*m0/m0(o2)
+            truth(o2, [o1, o3]) = truth(o2, [o1, o3])*(1 - side*r**2)
+            growth = maxval(abs(truth))
+            m = m0
+            q = no_turn
+            call flow_tangent(body, 6*decays, m, q, transition, by_moments)
+            worst(1) = worst_of(worst(1), [abs(transition(1:3, 1:3) - truth)]/growth)
+            ! W from J = E + m'^ W and m' W = h a m.
+            truth = handed*(truth - transition(4:6, 4:6))
+            truth(o1, :) = truth(o1, :) + r*m0(o3)*transition(3 + o2, 1:3)
+            truth(o3, :) = truth(o3, :) - r*m0(o1)*transition(3 + o2, 1:3)
+            worst(2) = worst_of(worst(2), [abs(side*m0(o2)*transition(3 + o3, 1:3) - truth(o1, :)), &
+                                           abs(side*m0(o2)*transition(3 + o1, 1:3) + truth(o3, :))]/growth)
+            worst(2) = worst_of(worst(2), abs(transition(3 + o2, o2)/(6*decays*a(o2)) - side)/abs(decays))
+            if (r > 1.0e-10_wp) cycle
+            truth = 0.0_wp
+            do k = 1, 3
+                truth([o1, o3], k) = a(k)**2*merge(2.0_wp, -1.0_wp, k == o2)*(1.5_wp/r)*[m0(o1), -m0(o3)]
+            end do
+            worst(3) = worst_of(worst(3), [abs(by_moments(1:3, :) - truth)]/maxval(abs(truth)))
+        end do
+        call t%at_most('from-end-to-end-of-the-separatrix: J', worst(1), tolerance)
+        call t%at_most('from-end-to-end-of-the-separatrix: W', worst(2), tolerance)
+        call t%at_most('from-end-to-end-of-the-separatrix: by moments', worst(3), tolerance)
+    end subroutine check_separatrix_derivatives
 
     !> I = 2, 3, 6 and |m1| = |m3|: the separatrix to the last bit. m2 = |m| tanh(kappa), m1 and m3 fall as
     !> sech(kappa), kappa grows by +-|m| h/6; and as the energy is that of a turn about axis 2, that axis

@@ -179,7 +179,7 @@ contains
         if (body%parity < 0.0_wp) call reflect(int(body%order(3)), transition, jacobian)
         if (present(by_inertia)) call inertia_columns(body, parts, m, elements, by_inertia)
         if (reached >= 1.0_wp) return
-        call follow_axis(body, h - reached*h, m, elements, q, transition, jacobian, by_inertia)
+        call follow_axis(body, h, h - reached*h, n, m, elements, q, transition, jacobian, by_inertia)
         if (present(q)) then
             call flow_body(body, h, n, code, p)
             q = p

@@ -22,7 +22,7 @@ module frb_flow_tangent_far
         real(wp) :: squares(lanes), triples(lanes), span(lanes)     !! doublings; square of the first time
         real(wp) :: z(lanes)                                        !! denominator of the triple
         real(wp) :: c(lanes)                                        !! the function of the triple for p
-        real(wp) :: n2(lanes), n3(lanes)                            !! momentum at mid-step
+        real(wp) :: n1(lanes), n2(lanes), n3(lanes)                 !! momentum at mid-step
         real(wp) :: cosine(lanes), sine(lanes), along(lanes)        !! of the turn e about m
     end type doubling_lanes
 
@@ -230,6 +230,7 @@ contains
             ends%e2(l) = of%m2(l) + d2
             ends%e3(l) = of%m3(l) + d3
             over = 1/n0
+            it%n1(l) = n1*over
             it%n2(l) = n2*over
             it%n3(l) = n3*over
         end do
@@ -287,8 +288,8 @@ contains
             d = ends%d(l)
             call phase_terms(c_is_cn, of%a(l), b, of%g(l), of%m1(l), of%m2(l), of%m3(l), it%n2(l), it%n3(l), &
                              s, c, d, x, yy, twice, over_d0, xg, yd, ye)
-            call long_gradients(c_is_cn, of%a(l), b, of%g(l), of%m1(l), of%m2(l), of%m3(l), s, c, d, &
-                                at%dd(l), at%own(l), x, yy, over_d0, xg, yd, ye, x1, x2, x3, y1, y2, &
+            call long_gradients(c_is_cn, of%a(l), b, of%g(l), of%m1(l), of%m2(l), of%m3(l), it%n1(l), s, &
+                                c, d, at%dd(l), at%own(l), x, yy, over_d0, xg, yd, ye, x1, x2, x3, y1, y2, &
                                 y3, ends%t1(l), ends%t2(l), ends%t3(l))
             call turn_matrix(d, x, yy, twice, ends%r11(l), ends%r12(l), ends%r13(l), ends%r22(l), &
                              ends%r23(l), ends%r33(l))

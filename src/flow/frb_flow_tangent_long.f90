@@ -62,8 +62,8 @@ contains
         if (present(q)) call advance_attitude(f, it, cosine, sine, q, transition)
         call phase_terms(f%c_is_cn, f%a, f%b, f%g, f%m1, f%m2, f%m3, f%n2, f%n3, f%s, f%c, f%d, x, yy, &
                          twice, over_d0, xg, yd, ye)
-        call long_gradients(f%c_is_cn, f%a, f%b, f%g, f%m1, f%m2, f%m3, f%s, f%c, f%d, it%dd, it%own, x, yy, &
-                            over_d0, xg, yd, ye, x1, x2, x3, y1, y2, y3, t1, t2, t3)
+        call long_gradients(f%c_is_cn, f%a, f%b, f%g, f%m1, f%m2, f%m3, f%n1, f%s, f%c, f%d, it%dd, it%own, &
+                            x, yy, over_d0, xg, yd, ye, x1, x2, x3, y1, y2, y3, t1, t2, t3)
         call turn_matrix(f%d, x, yy, twice, r11, r12, r13, r22, r23, r33)
         x1 = (twice*f%d)*x1
         x2 = (twice*f%d)*x2
