@@ -277,7 +277,7 @@ contains
         type(doubling_lanes), intent(in) :: it
         type(lane_triples), intent(in) :: at
         type(lane_ends), intent(inout) :: ends
-        real(wp) :: x, yy, twice, over_d0, xg, yd, ye, x1, x2, x3, y1, y2, y3, s, c, d
+        real(wp) :: x, yy, twice, over_d0, x1, x2, x3, y1, y2, y3, s, c, d
         logical :: c_is_cn
         integer :: l
 
@@ -286,11 +286,11 @@ contains
             s = at%s(l)
             c = it%c(l)
             d = ends%d(l)
-            call phase_terms(c_is_cn, of%a(l), b, of%g(l), of%m1(l), of%m2(l), of%m3(l), it%n2(l), it%n3(l), &
-                             s, c, d, x, yy, twice, over_d0, xg, yd, ye)
-            call long_gradients(c_is_cn, of%a(l), b, of%g(l), of%m1(l), of%m2(l), of%m3(l), it%n1(l), s, &
-                                c, d, at%dd(l), at%own(l), x, yy, over_d0, xg, yd, ye, x1, x2, x3, y1, y2, &
-                                y3, ends%t1(l), ends%t2(l), ends%t3(l))
+            call phase_terms(c_is_cn, of%a(l), b, of%g(l), of%m1(l), of%m3(l), it%n2(l), it%n3(l), s, c, d, &
+                             x, yy, twice, over_d0)
+            call long_gradients(c_is_cn, of%a(l), b, of%g(l), of%m1(l), of%m2(l), of%m3(l), it%n1(l), &
+                                it%n2(l), it%n3(l), s, c, d, at%dd(l), at%own(l), over_d0, x1, x2, x3, y1, &
+                                y2, y3, ends%t1(l), ends%t2(l), ends%t3(l))
             call turn_matrix(d, x, yy, twice, ends%r11(l), ends%r12(l), ends%r13(l), ends%r22(l), &
                              ends%r23(l), ends%r33(l))
             ends%x(l) = x

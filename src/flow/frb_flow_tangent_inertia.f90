@@ -32,16 +32,22 @@ contains
         integer, intent(in) :: elements                 !! 3 or 6
         real(wp), intent(out) :: columns(6, elements)
         type(phase) :: it
-        real(wp) :: turns(3, 3), signs(3), a(3)
+        real(wp) :: turns(3, 3), signs(3), a(3), cn, half
         integer :: axes(3), i, j, k
 
-        call phase_terms(f%c_is_cn, f%a, f%b, f%g, f%m1, f%m2, f%m3, f%n2, f%n3, f%s, f%c, f%d, it%x, it%yy, &
-                         it%twice, it%over_d0, it%xg, it%yd, it%ye)
+        call phase_terms(f%c_is_cn, f%a, f%b, f%g, f%m1, f%m3, f%n2, f%n3, f%s, f%c, f%d, it%x, it%yy, &
+                         it%twice, it%over_d0)
         call bounded_integrals(f%c_is_cn, f%s, f%c, f%d, f%dd, it%c2a, it%d2b)
         it%over_w = 1/(1 + f%nu*(f%s*f%s))
         it%shift = f%g*((f%d*f%d)*f%dd)*it%over_w
         it%sign = merge(1.0_wp, -1.0_wp, f%c_is_cn)
         it%dn = merge(f%d, f%c, f%c_is_cn)
+        ! By dM and dD, at a shifted time, x changes by xg (dD/dn - dn dM), d dY - Y dd is yd dM + ye dD.
+        cn = merge(f%c, f%d, f%c_is_cn)
+        half = 0.5_wp*(f%s*f%s)*(f%s*it%over_d0)
+        it%xg = (f%g*f%m2)*cn*half
+        it%yd = (f%b*f%m3)*(f%c*f%d)*half
+        it%ye = -it%sign*(f%b*f%m3)*(cn/it%dn)*half
         axes = [f%o1, f%o2, f%o3]
         signs = [f%s1, 1.0_wp, f%s3]
         a(body%order) = body%a

@@ -43,7 +43,7 @@ contains
         real(wp), intent(inout), optional :: jacobian(3, 3)
         type(step_parts) :: f
         type(doubling_state) :: it
-        real(wp) :: x, yy, twice, over_d0, xg, yd, ye, x1, x2, x3, y1, y2, y3, t1, t2, t3
+        real(wp) :: x, yy, twice, over_d0, x1, x2, x3, y1, y2, y3, t1, t2, t3
         real(wp) :: g1, g2, g3
         real(wp) :: r11, r12, r13, r22, r23, r33, j11, j12, j13, j21, j22, j23, j31, j32, j33, cosine, sine
 
@@ -60,10 +60,10 @@ contains
         call double_up(f, it, present(q))
         call advance_momentum(f, it%delta, m)
         if (present(q)) call advance_attitude(f, it, cosine, sine, q, transition)
-        call phase_terms(f%c_is_cn, f%a, f%b, f%g, f%m1, f%m2, f%m3, f%n2, f%n3, f%s, f%c, f%d, x, yy, &
-                         twice, over_d0, xg, yd, ye)
-        call long_gradients(f%c_is_cn, f%a, f%b, f%g, f%m1, f%m2, f%m3, f%n1, f%s, f%c, f%d, it%dd, it%own, &
-                            x, yy, over_d0, xg, yd, ye, x1, x2, x3, y1, y2, y3, t1, t2, t3)
+        call phase_terms(f%c_is_cn, f%a, f%b, f%g, f%m1, f%m3, f%n2, f%n3, f%s, f%c, f%d, x, yy, twice, &
+                         over_d0)
+        call long_gradients(f%c_is_cn, f%a, f%b, f%g, f%m1, f%m2, f%m3, f%n1, f%n2, f%n3, f%s, f%c, f%d, &
+                            it%dd, it%own, over_d0, x1, x2, x3, y1, y2, y3, t1, t2, t3)
         call turn_matrix(f%d, x, yy, twice, r11, r12, r13, r22, r23, r33)
         x1 = (twice*f%d)*x1
         x2 = (twice*f%d)*x2
