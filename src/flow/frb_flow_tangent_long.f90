@@ -100,8 +100,8 @@ contains
         end if
     end subroutine long_tangent
 
-    !> The constants of the motion in the form with the smaller nu, and the part of the half step that remains
-    !> without whole periods.
+    !> The constants of the motion, with attitude in the form with the smaller nu, and the part of the half
+    !> step that remains without whole periods.
     pure subroutine set_orbit(body, t, m, with_attitude, on_separatrix, f, it)
         type(body_core), intent(in) :: body
         real(wp), intent(in) :: t, m(3)
@@ -117,7 +117,7 @@ contains
         it%delta = merge(0.0_wp, abs(it%delta), on_separatrix)
         it%pmax = max(f%p, f%r)
         it%pmin = min(f%p, f%r)
-        call choose_form(body, t, mirror, f)
+        if (with_attitude) call choose_form(body, t, mirror, f)
         it%fraction = 1.0_wp
         it%turned = 1.0_wp
         it%whole_third = 0.0_wp
