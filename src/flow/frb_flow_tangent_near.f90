@@ -14,11 +14,13 @@ module frb_flow_tangent_near
     type :: series_lanes
         real(wp), dimension(lanes) :: dd, aa, bb, third             !! D, A, B, H
         real(wp), dimension(lanes) :: nu, side                      !! of the form; 1: first, -1: mirror form
-        real(wp), dimension(lanes) :: y, scd, over_cc, over_dd, l1, l2, l3          !! middle_momentum
+        real(wp), dimension(lanes) :: x1, x3, over_cc, over_dd, over_d0     !! middle_factors, middle_inverses
+        real(wp), dimension(lanes) :: y, scd, l1, l2, l3                    !! middle_momentum
         real(wp), dimension(lanes) :: l11, l12, l13, l21, l22, l23, l31, l32, l33
         real(wp), dimension(lanes) :: psi, cotangent, slope         !! turn_rate
         real(wp), dimension(lanes) :: kappa, r1, r2, r3             !! kappa_1, grad rho
-        real(wp), dimension(lanes) :: w0, y1, y2, y3, twice, e1, e2, e3     !! turn_of_middle; m'
+        real(wp), dimension(lanes) :: y1, y2, y3, yy, twice, e1, e2, e3     !! turn_of_middle; m'
+        real(wp), dimension(lanes) :: w0                                    !! 1/sqrt(1 + |Y|^2) - 1
     end type series_lanes
 
 contains
@@ -39,11 +41,14 @@ contains
         e = j + 21
         if (kind /= tiny) call choose_forms(body, of, it)
         if (kind == tiny) then
-            call find_tiny_series(of, it)
-        else if (kind == short) then
-            call find_short_series(of, it)
+            call find_tiny_series(body, of, it)
         else
-            call find_middle_series(of, it)
+            if (kind == short) then
+                call find_short_series(of, it)
+            else
+                call find_middle_series(of, it)
+            end if
+            call find_factors(body, of, it)
         end if
         call find_middles(body, of, it)
         if (kind == tiny) then
@@ -54,6 +59,7 @@ contains
         end if
         associate (o => body%order)
             call find_momenta(body, of, it, m(o(1)), m(o(2)), m(o(3)))
+            call find_norms(kind, it)
             call set_attitudes(it, of%q(:, 1), of%q(:, 1 + o(1)), of%q(:, 1 + o(2)), of%q(:, 1 + o(3)), &
                                q(1), q(1 + o(1)), q(1 + o(2)), q(1 + o(3)))
             call set_turns(body, it, phi(j(1, 1)), phi(j(2, 1)), phi(j(3, 1)), phi(j(1, 2)), phi(j(2, 2)), &
@@ -122,17 +128,40 @@ contains
         end do
     end subroutine find_middle_series
 
-    !> The first terms of the integrals.
-    pure subroutine find_tiny_series(of, it)
+    !> The factors of L from the integrals.
+    pure subroutine find_factors(body, of, it)
+        type(lane_body), intent(in) :: body
         type(lane_orbits), intent(in) :: of
         type(series_lanes), intent(inout) :: it
-        real(wp) :: p, r
+        real(wp) :: p, r, m2
         integer :: l
 
         do l = 1, lanes
             p = of%p(l)
             r = of%r(l)
-            call tiny_integrals(p + r, p*r, p, r, it%dd(l), it%aa(l), it%bb(l))
+            m2 = of%m2(l)
+            call middle_factors(p, r, it%dd(l), it%aa(l), it%bb(l), it%x1(l), it%x3(l))
+            call middle_inverses(p, r, ((body%a*body%g)*m2)*m2, 1 + middle_square(it%x1(l), it%x3(l)), &
+                                 it%over_cc(l), it%over_dd(l), it%over_d0(l))
+        end do
+    end subroutine find_factors
+
+    !> Integrals and factors by the first terms of their series.
+    pure subroutine find_tiny_series(body, of, it)
+        type(lane_body), intent(in) :: body
+        type(lane_orbits), intent(in) :: of
+        type(series_lanes), intent(inout) :: it
+        real(wp) :: p, r, m2, dd
+        integer :: l
+
+        do l = 1, lanes
+            p = of%p(l)
+            r = of%r(l)
+            m2 = of%m2(l)
+            call tiny_integrals(p + r, p*r, p, r, dd, it%aa(l), it%bb(l))
+            call middle_factors(p, r, dd, it%aa(l), it%bb(l), it%x1(l), it%x3(l))
+            call tiny_inverses(p, r, ((body%a*body%g)*m2)*m2, 1 + middle_square(it%x1(l), it%x3(l)), &
+                               it%over_cc(l), it%over_dd(l), it%over_d0(l))
         end do
     end subroutine find_tiny_series
 
@@ -141,7 +170,7 @@ contains
         type(lane_body), intent(in) :: body
         type(lane_orbits), intent(in) :: of
         type(series_lanes), intent(inout) :: it
-        real(wp) :: m1, m2, m3, p, r, aa, bb, y, over_cc, over_dd, over_d0, x1, x2, x3, z, l1, l2, l3
+        real(wp) :: m1, m2, m3, p, r, aa, bb, y, over_d0, x1, x2, x3, z, l1, l2, l3
         integer :: l
 
         do l = 1, lanes
@@ -152,15 +181,16 @@ contains
             r = of%r(l)
             aa = it%aa(l)
             bb = it%bb(l)
-            call middle_momentum(body%a, body%b, body%g, m1, m2, m3, p, r, it%dd(l), aa, bb, y, it%scd(l), &
-                                 over_cc, over_dd, over_d0, x1, x2, x3, z, l1, l2, l3)
-            call middle_by_momentum(body%a, body%b, body%g, m1, m2, m3, p, r, y, aa, bb, over_cc, over_dd, &
-                                    over_d0, x1, x2, x3, z, l1, l2, l3, &
+            x1 = it%x1(l)
+            x3 = it%x3(l)
+            over_d0 = it%over_d0(l)
+            call middle_momentum(body%a, body%b, body%g, m1, m2, m3, p, over_d0, x1, x2, x3, z, y, it%scd(l), &
+                                 l1, l2, l3)
+            call middle_by_momentum(body%a, body%b, body%g, m1, m2, m3, p, r, y, aa, bb, it%over_cc(l), &
+                                    it%over_dd(l), over_d0, x1, x2, x3, z, l1, l2, l3, &
                                     it%l11(l), it%l12(l), it%l13(l), it%l21(l), it%l22(l), it%l23(l), &
                                     it%l31(l), it%l32(l), it%l33(l))
             it%y(l) = y
-            it%over_cc(l) = over_cc
-            it%over_dd(l) = over_dd
             it%l1(l) = l1
             it%l2(l) = l2
             it%l3(l) = l3
@@ -178,7 +208,7 @@ contains
 
         do l = 1, lanes
             call turn_of_middle(body%a, body%b, body%g, it%l1(l), it%l2(l), it%l3(l), it%kappa(l), it%y(l), &
-                                it%scd(l), it%y1(l), it%y2(l), it%y3(l), it%w0(l), it%twice(l), d1, d2, d3)
+                                it%scd(l), it%y1(l), it%y2(l), it%y3(l), it%yy(l), it%twice(l), d1, d2, d3)
             d1 = of%m1(l) + d1
             d2 = of%m2(l) + d2
             d3 = of%m3(l) + d3
@@ -286,6 +316,25 @@ contains
         end do
     end subroutine find_rates
 
+    !> The norms of the turns (1, Y), less 1, inverse.
+    pure subroutine find_norms(kind, it)
+        integer, intent(in) :: kind
+        type(series_lanes), intent(inout) :: it
+        real(wp) :: yy
+        integer :: l
+
+        if (kind == tiny) then
+            do l = 1, lanes
+                it%w0(l) = tiny_norm(it%yy(l))
+            end do
+        else
+            do l = 1, lanes
+                yy = it%yy(l)
+                it%w0(l) = -yy/(sqrt(1 + yy) + (1 + yy))
+            end do
+        end if
+    end subroutine find_norms
+
     !> Attitudes at the end.
     pure subroutine set_attitudes(it, b0, b1, b2, b3, a0, a1, a2, a3)
         type(series_lanes), intent(in) :: it
@@ -381,6 +430,8 @@ contains
     include 'tangent_middle_formulas.inc'
 
     include 'tangent_step_turn.inc'
+
+    include 'norm_formulas.inc'
 
     include 'turn_formulas.inc'
 
