@@ -2,12 +2,15 @@
 !> all digits, the group law adds the remaining time in closed form, with hyperbolic functions that may
 !> overflow.
 !>
-!> In sorted axes, with k = -sign(m2 tau) sqrt(alpha/gamma), u = dm1 + k dm3 grows and v = dm1 - k dm3 decays.
-!> Where the motion began still closer to the axis, v is the larger one, and u and more are lost in its
-!> rounding. But m1 = -k m3, and (a2 |m|^2 - 2 T)/2, |m|^2/2 and the action T h of the step give
+!> In sorted axes, with k = -sign(m2 tau) sqrt(alpha/gamma), u = (dm1 + k dm3)/2 grows and v = (dm1 - k dm3)/2
+!> decays. Of a motion that arrives at the axis, m1 = -k m3, and (a2 |m|^2 - 2 T)/2, |m|^2/2 and the action
+!> T h of the step are known without rounding:
 !>
-!>     -gamma m1 u = alpha m3 dm3 - gamma m1 dm1 = c at the start,   m' dm' = m dm,
+!>     -2 gamma m1 u = alpha m3 dm3 - gamma m1 dm1 = c at the start,   m' dm' = m dm,
 !>     m' dtheta' = m dtheta + h dT
+!>
+!> The columns of the first part of the step give the same, but where the motion began still closer to the
+!> axis, v is so much larger than u that u is lost in its rounding. So are dm2' and dtheta2' beside u.
 module frb_flow_tangent_axis
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
@@ -20,12 +23,21 @@ module frb_flow_tangent_axis
     type :: axis_map
         integer :: exponent             !! growth = 2^exponent factor
         real(wp) :: factor, decay       !! decay = 1/growth
+        real(wp) :: x                   !! log growth
         real(wp) :: k, alpha, gamma
         real(wp) :: turn_c, turn_s, m1, m2, a2_tau
-        logical :: by_constants         !! the motion began closer to the axis than m
+        logical :: leaving              !! the motion has not turned yet: constants do not help
+        logical :: closer               !! it has, and began closer to the axis than m
         integer :: o1, o2, o3
         real(wp) :: parity
     end type axis_map
+
+    !> What is known of a column without rounding.
+    type :: known_numbers
+        real(wp) :: c, norm, u          !! c, m dm, u
+        logical :: has_u
+        real(wp) :: action              !! m dtheta + h dT
+    end type known_numbers
 
     real(wp), parameter :: no_turn(3) = 0.0_wp
 
@@ -39,31 +51,41 @@ contains
         real(wp), intent(in) :: h, tau, m0(3), m(3)
         include 'tangent_results.inc'
         type(axis_map) :: map
-        real(wp) :: column(6), constant(3), action(3)
+        type(known_numbers) :: known(3)
+        real(wp) :: column(6), a(3)
         integer :: k
 
         map = new_map(body, tau, m0, m)
-        constant(map%o1) = -body%gamma*m0(map%o1)
-        constant(map%o2) = 0.0_wp
-        constant(map%o3) = body%alpha*m0(map%o3)
+        a(body%order) = body%a
+        known%c = 0.0_wp
+        known(map%o1)%c = -body%gamma*m0(map%o1)
+        known(map%o3)%c = body%alpha*m0(map%o3)
+        known%norm = m0
+        known%u = 0.0_wp
+        known%has_u = map%closer
+        known(map%o2)%has_u = .not. map%leaving
+        if (map%closer) then
+            known(map%o1)%u = 0.5_wp*(m0(map%o1)/map%m1)
+            known(map%o3)%u = -0.5_wp*(body%alpha/body%gamma)*(m0(map%o3)/map%m1)
+        end if
+        known%action = h*a*m0
         if (.not. present(q)) then
             do k = 1, 3
                 column = [jacobian(:, k), 0.0_wp, 0.0_wp, 0.0_wp]
-                call apply(map, map%by_constants .or. k == map%o2, constant(k), m0(k), no_turn, column)
+                if (k == map%o2) call shift(map, 2*m0(k)/map%m2**2, column)
+                call apply(map, known(k), no_turn, column)
                 jacobian(:, k) = column(1:3)
             end do
             return
         end if
-        action(body%order) = h*body%a
-        action = action*m0
         do k = 1, 3
+            if (k == map%o2) call shift(map, 2*m0(k)/map%m2**2, transition(:, k))
             call turn_column(map, transition(4:6, 3 + k))
-            call apply(map, map%by_constants .or. k == map%o2, constant(k), m0(k), transition(4:6, 3 + k), &
-                       transition(:, k), action(k))
+            call apply(map, known(k), transition(4:6, 3 + k), transition(:, k))
         end do
         if (present(by_inertia)) then
             do k = 1, elements
-                call follow_inertia(body, map, m0, k, by_inertia(:, k))
+                call follow_inertia(body, map, h, m0, k, by_inertia(:, k))
             end do
         end if
     end subroutine follow_axis
@@ -85,7 +107,6 @@ contains
         map%gamma = body%gamma
         map%m1 = m(map%o1)
         map%m2 = sign(norm2(m), m(map%o2))
-        map%by_constants = abs(map%m1) > abs(m0(map%o1))
         map%a2_tau = body%a(2)*tau
         x = abs(map%m2*tau)*sqrt(body%alpha)*sqrt(body%gamma)
         f = x/log_2
@@ -94,7 +115,11 @@ contains
         map%factor = exp(min(x - map%exponent*log_2, 1.0_wp))
         map%decay = 0.0_wp
         if (x < 600.0_wp) map%decay = exp(-x)
+        map%x = x
         map%k = -sign(sqrt(body%alpha/body%gamma), tau*map%m2)
+        map%closer = abs(map%m1) > abs(m0(map%o1))
+        map%leaving = map%closer .and. sign(1.0_wp, map%m1)*map%k*map%parity*m(map%o3) > 0.0_wp
+        map%closer = map%closer .and. .not. map%leaving
         map%turn_c = cos(map%a2_tau*map%m2)
         map%turn_s = sin(map%a2_tau*map%m2)
     end function new_map
@@ -111,15 +136,26 @@ contains
         theta(map%o3) = map%parity*(map%turn_s*t1 + map%turn_c*t3)
     end subroutine turn_column
 
+    !> Adds to v what a change of log growth, half of `relative` to it, makes of m1 in the time tau.
+    pure subroutine shift(map, relative, column)
+        type(axis_map), intent(in) :: map
+        real(wp), intent(in) :: relative
+        real(wp), intent(inout) :: column(6)
+        real(wp) :: v
+
+        if (map%leaving) return
+        v = -0.5_wp*(map%x*relative)*map%m1
+        column(map%o1) = column(map%o1) + v
+        column(map%o3) = column(map%o3) - map%parity*v/map%k
+    end subroutine shift
+
     !> Phi on a column (dm, dtheta) in the axes of the body, given what E of the whole step makes of the dm at
     !> the start. From J = E + m'^ W: dtheta1' = -(dm3' - (E dm)_3)/m2, dtheta3' = (dm1' - (E dm)_1)/m2.
-    pure subroutine apply(map, by_constants, constant, norm, turned, column, action)
+    pure subroutine apply(map, known, turned, column)
         type(axis_map), intent(in) :: map
-        logical, intent(in) :: by_constants
-        real(wp), intent(in) :: constant, norm      !! at the start, c and m dm
+        type(known_numbers), intent(in) :: known
         real(wp), intent(in) :: turned(3)           !! E dm
         real(wp), intent(inout) :: column(6)
-        real(wp), intent(in), optional :: action    !! m dtheta + h dT
         real(wp) :: m1, m3, e1, e3, n1, n3, over, u, v
 
         over = 1/map%m2
@@ -128,15 +164,17 @@ contains
         e1 = over*turned(map%o1)
         e3 = over*map%parity*turned(map%o3)
         u = 0.5_wp*(m1 + map%k*m3)
+        if (known%has_u) u = known%u
         v = 0.5_wp*(m1 - map%k*m3)
-        column(3 + map%o2) = column(3 + map%o2) + map%a2_tau*column(map%o2)
-        if (by_constants) then
-            u = 0.0_wp
-            if (abs(constant) > 0.0_wp) u = -0.5_wp*constant/(map%gamma*map%m1)
-            column(map%o2) = over*(norm + 0.5_wp*constant*(1/map%gamma - 1/map%alpha) &
-                                   - (v*map%decay)*(map%m1*map%decay)*(1 + map%gamma/map%alpha))
-            if (present(action)) column(3 + map%o2) = over*(action - over*constant/(map%gamma*map%k) &
-                                                            - (map%decay*map%m1)*(e3 + e1/map%k))
+        if (map%leaving) then
+            column(3 + map%o2) = column(3 + map%o2) + map%a2_tau*column(map%o2)
+        else
+            column(3 + map%o2) = over*(known%action - over*known%c/(map%gamma*map%k) &
+                                       - (map%decay*map%m1)*(e3 + e1/map%k))
+            column(map%o2) = over*(known%norm + 0.5_wp*known%c*(1/map%gamma - 1/map%alpha))
+            ! m1 v is as small as m1^2, and without digits, unless v is the larger one.
+            if (map%closer) column(map%o2) = column(map%o2) - over*(v*map%decay)*(map%m1*map%decay) &
+                                             *(1 + map%gamma/map%alpha)
         end if
         v = (v*map%decay)*map%decay
         n1 = map%factor*(u + v)
@@ -150,57 +188,93 @@ contains
     !> The column of an element of the inertia. On the axis that of axis 2 alone turns the body; an element
     !> off the diagonal is a turn phi of the axes, which changes the column by (-phi x m, phi) before Phi and
     !> back after it: phi = e3/gamma for A_12, e1/alpha for A_23, along the axis, so without effect, for A_13.
-    !> The form f of the constant of the motion changes too: c is f(m0) - f(m).
-    pure subroutine follow_inertia(body, map, m0, element, column)
+    !> c is f(m0) - f(m'), f = m dA m/2 less its part in |m|^2: what f loses in the time tau adds to u. The
+    !> action loses the integral of omega_i omega_j by I_ij: one of m_i m_j is a component of m.
+    pure subroutine follow_inertia(body, map, h, m0, element, column)
         type(body_core), intent(in) :: body
         type(axis_map), intent(in) :: map
-        real(wp), intent(in) :: m0(3)
+        real(wp), intent(in) :: h, m0(3)
         integer, intent(in) :: element
         real(wp), intent(inout) :: column(6)
         integer, parameter :: without(4:6) = [3, 2, 1]      ! the axis that is not in 12, 13, 23
-        real(wp) :: turn(6), factor, f0, f, a(3), n0(3), n(3)
+        type(known_numbers) :: known
+        real(wp) :: turn(6), factor, over, lost, square, a(3), n0(3), n(3), end(3)
 
-        turn = 0.0_wp
         a = body%a
         n0 = m0(body%order)
-        n = [map%m1, 0.0_wp, -map%parity*map%m1/map%k]
-        f = 0.0_wp
+        n = [map%m1, map%m2, -map%parity*map%m1/map%k]
+        end = map%decay*n
+        over = 0.0_wp
+        if (abs(map%m1) > 0.0_wp) over = -0.5_wp/map%m1
+        over = over/body%gamma
+        turn = 0.0_wp
+        lost = form(over*n, n)
+        ! The integral of m1^2: the derivative of m2 is beta m1 m3, m3^2 = m1^2 gamma/alpha.
+        square = sqrt(body%alpha/body%gamma)*(n(2) - n0(2))/body%beta
+        square = sign(square, square*sign(1.0_wp, n0(1))*sign(1.0_wp, map%parity*n0(3)))
         if (element == map%o1) then
-            f0 = 0.5_wp*(a(1)*n0(1))**2
-            f = 0.5_wp*(a(1)*n(1))**2
+            call shift(map, -a(1)**2/body%gamma, column)
+            known%action = -0.5_wp*a(1)**2*(h*n0(1)**2 + square)
         else if (element == map%o2) then
-            f0 = -0.5_wp*a(2)**2*(n0(1)**2 + n0(3)**2)
-            f = -0.5_wp*a(2)**2*(n(1)**2 + n(3)**2)
+            call shift(map, a(2)**2*(1/body%gamma - 1/body%alpha), column)
+            square = (1 + body%gamma/body%alpha)*square
+            known%action = -0.5_wp*a(2)**2*(h*(2*n0(2)**2 + (n0(1)**2 + n0(3)**2)) - square)
+            column(3 + map%o2) = column(3 + map%o2) - body%a(2)*(map%a2_tau*map%m2)
         else if (element == map%o3) then
-            f0 = 0.5_wp*(a(3)*n0(3))**2
-            f = 0.5_wp*(a(3)*n(3))**2
+            call shift(map, a(3)**2/body%alpha, column)
+            known%action = -0.5_wp*a(3)**2*(h*n0(3)**2 + square*(body%gamma/body%alpha))
         else if (without(element) == map%o3) then
             factor = -a(1)*a(2)/body%gamma
             turn(map%o1) = factor*map%m2
             turn(3 + map%o3) = map%parity*factor
-            f0 = a(1)*a(2)*(n0(1)*n0(2))
+            known%action = end(3)*turn(3 + map%o3) &
+                           + a(1)*a(2)*(map%parity*(end(3) - n0(3))/body%gamma - h*n0(1)*n0(2))
+            lost = 0.0_wp
         else if (without(element) == map%o1) then
             factor = -a(2)*a(3)/body%alpha*map%parity
             turn(map%o3) = -map%parity*factor*map%m2
             turn(3 + map%o1) = factor
-            f0 = a(2)*a(3)*(n0(2)*n0(3))
+            known%action = end(1)*factor &
+                           + a(2)*a(3)*(map%parity*(end(1) - n0(1))/body%alpha - h*n0(2)*n0(3))
+            lost = 0.0_wp
         else
-            f0 = a(1)*a(3)*(n0(1)*n0(3))
-            f = a(1)*a(3)*(n(1)*n(3))
+            known%action = -a(1)*a(3)*(map%parity*(n(2) - n0(2))/body%beta + h*n0(1)*n0(3))
         end if
+        known%norm = 0.0_wp
+        known%has_u = map%closer
+        known%c = form(n0, n0)
+        if (map%closer) known%u = form(over*n0, n0) - map%decay**2*lost
         column = column + turn
-        ! What f loses in the time tau adds to u.
-        f0 = f0 - map%decay**2*f
-        if (abs(f) > 0.0_wp) then
-            f = 0.5_wp*(1 - map%decay**2)*f/(map%gamma*map%m1)
-            column(map%o1) = column(map%o1) - f
-            column(map%o3) = column(map%o3) - map%parity*f/map%k
+        if (.not. map%leaving) then
+            lost = (1 - map%decay**2)*lost
+            column(map%o1) = column(map%o1) + lost
+            column(map%o3) = column(map%o3) + map%parity*lost/map%k
         end if
-        call apply(map, map%by_constants, f0, 0.0_wp, no_turn, column)
+        call apply(map, known, no_turn, column)
         column = column - turn
-        if (element == map%o2) then
-            column(3 + map%o2) = column(3 + map%o2) - body%a(2)*(map%a2_tau*map%m2)
-        end if
+
+    contains
+
+        !> f as a form of two vectors in sorted axes: a small component is not squared.
+        pure function form(p, q) result(f)
+            real(wp), intent(in) :: p(3), q(3)
+            real(wp) :: f
+
+            if (element == map%o1) then
+                f = 0.5_wp*a(1)**2*(p(1)*q(1))
+            else if (element == map%o2) then
+                f = -0.5_wp*a(2)**2*(p(1)*q(1) + p(3)*q(3))
+            else if (element == map%o3) then
+                f = 0.5_wp*a(3)**2*(p(3)*q(3))
+            else if (without(element) == map%o3) then
+                f = a(1)*a(2)*(p(1)*q(2))
+            else if (without(element) == map%o1) then
+                f = a(2)*a(3)*(q(2)*p(3))
+            else
+                f = a(1)*a(3)*(p(1)*q(3))
+            end if
+        end function form
+
     end subroutine follow_inertia
 
 end module frb_flow_tangent_axis
