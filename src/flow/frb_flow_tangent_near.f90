@@ -184,8 +184,8 @@ contains
             x1 = it%x1(l)
             x3 = it%x3(l)
             over_d0 = it%over_d0(l)
-            call middle_momentum(body%a, body%b, body%g, m1, m2, m3, p, over_d0, x1, x2, x3, z, y, it%scd(l), &
-                                 l1, l2, l3)
+            call middle_momentum(body%a, body%b, body%g, m1, m2, m3, p, over_d0, x1, x2, x3, z, y, &
+                                 it%scd(l), l1, l2, l3)
             call middle_by_momentum(body%a, body%b, body%g, m1, m2, m3, p, r, y, aa, bb, it%over_cc(l), &
                                     it%over_dd(l), over_d0, x1, x2, x3, z, l1, l2, l3, &
                                     it%l11(l), it%l12(l), it%l13(l), it%l21(l), it%l22(l), it%l23(l), &
