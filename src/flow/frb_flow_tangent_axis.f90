@@ -23,7 +23,7 @@ module frb_flow_tangent_axis
     type :: axis_map
         integer :: exponent             !! growth = 2^exponent factor
         real(wp) :: factor, decay       !! decay = 1/growth
-        real(wp) :: x                   !! log growth
+        real(wp) :: log_growth
         real(wp) :: k, alpha, gamma
         real(wp) :: turn_c, turn_s, m1, m2, a2_tau
         logical :: leaving              !! the motion has not turned yet: constants do not help
@@ -34,7 +34,7 @@ module frb_flow_tangent_axis
 
     !> What is known of a column without rounding.
     type :: known_numbers
-        real(wp) :: c, norm, u          !! c, m dm, u
+        real(wp) :: c, m_dm, u          !! c, m dm, u
         logical :: has_u
         real(wp) :: action              !! m dtheta + h dT
     end type known_numbers
@@ -60,7 +60,7 @@ contains
         known%c = 0.0_wp
         known(map%o1)%c = -body%gamma*m0(map%o1)
         known(map%o3)%c = body%alpha*m0(map%o3)
-        known%norm = m0
+        known%m_dm = m0
         known%u = 0.0_wp
         known%has_u = map%closer
         known(map%o2)%has_u = .not. map%leaving
@@ -115,7 +115,7 @@ contains
         map%factor = exp(min(x - map%exponent*log_2, 1.0_wp))
         map%decay = 0.0_wp
         if (x < 600.0_wp) map%decay = exp(-x)
-        map%x = x
+        map%log_growth = x
         map%k = -sign(sqrt(body%alpha/body%gamma), tau*map%m2)
         map%closer = abs(map%m1) > abs(m0(map%o1))
         map%leaving = map%closer .and. sign(1.0_wp, map%m1)*map%k*map%parity*m(map%o3) > 0.0_wp
@@ -144,7 +144,7 @@ contains
         real(wp) :: v
 
         if (map%leaving) return
-        v = -0.5_wp*(map%x*relative)*map%m1
+        v = -0.5_wp*(map%log_growth*relative)*map%m1
         column(map%o1) = column(map%o1) + v
         column(map%o3) = column(map%o3) - map%parity*v/map%k
     end subroutine shift
@@ -171,7 +171,7 @@ contains
         else
             column(3 + map%o2) = over*(known%action - over*known%c/(map%gamma*map%k) &
                                        - (map%decay*map%m1)*(e3 + e1/map%k))
-            column(map%o2) = over*(known%norm + 0.5_wp*known%c*(1/map%gamma - 1/map%alpha))
+            column(map%o2) = over*(known%m_dm + 0.5_wp*known%c*(1/map%gamma - 1/map%alpha))
             ! m1 v is as small as m1^2, and without digits, unless v is the larger one.
             if (map%closer) column(map%o2) = column(map%o2) - over*(v*map%decay)*(map%m1*map%decay) &
                                              *(1 + map%gamma/map%alpha)
@@ -198,31 +198,30 @@ contains
         real(wp), intent(inout) :: column(6)
         integer, parameter :: without(4:6) = [3, 2, 1]      ! the axis that is not in 12, 13, 23
         type(known_numbers) :: known
-        real(wp) :: turn(6), factor, over, lost, square, a(3), n0(3), n(3), end(3)
+        real(wp) :: turn(6), factor, over, lost, integral, a(3), n0(3), n(3), end(3)
 
         a = body%a
         n0 = m0(body%order)
         n = [map%m1, map%m2, -map%parity*map%m1/map%k]
         end = map%decay*n
-        over = 0.0_wp
-        if (abs(map%m1) > 0.0_wp) over = -0.5_wp/map%m1
-        over = over/body%gamma
+        ! With m1 = 0 nothing is lost, and a compiler may divide where the quotient is not used.
+        over = -0.5_wp/(body%gamma*merge(map%m1, 1.0_wp, abs(map%m1) > 0.0_wp))
         turn = 0.0_wp
         lost = form(over*n, n)
         ! The integral of m1^2: the derivative of m2 is beta m1 m3, m3^2 = m1^2 gamma/alpha.
-        square = sqrt(body%alpha/body%gamma)*(n(2) - n0(2))/body%beta
-        square = sign(square, square*sign(1.0_wp, n0(1))*sign(1.0_wp, map%parity*n0(3)))
+        integral = sqrt(body%alpha/body%gamma)*(n(2) - n0(2))/body%beta
+        integral = sign(integral, integral*sign(1.0_wp, n0(1))*sign(1.0_wp, map%parity*n0(3)))
         if (element == map%o1) then
             call shift(map, -a(1)**2/body%gamma, column)
-            known%action = -0.5_wp*a(1)**2*(h*n0(1)**2 + square)
+            known%action = -0.5_wp*a(1)**2*(h*n0(1)**2 + integral)
         else if (element == map%o2) then
             call shift(map, a(2)**2*(1/body%gamma - 1/body%alpha), column)
-            square = (1 + body%gamma/body%alpha)*square
-            known%action = -0.5_wp*a(2)**2*(h*(2*n0(2)**2 + (n0(1)**2 + n0(3)**2)) - square)
+            integral = (1 + body%gamma/body%alpha)*integral
+            known%action = -0.5_wp*a(2)**2*(h*(2*n0(2)**2 + (n0(1)**2 + n0(3)**2)) - integral)
             column(3 + map%o2) = column(3 + map%o2) - body%a(2)*(map%a2_tau*map%m2)
         else if (element == map%o3) then
             call shift(map, a(3)**2/body%alpha, column)
-            known%action = -0.5_wp*a(3)**2*(h*n0(3)**2 + square*(body%gamma/body%alpha))
+            known%action = -0.5_wp*a(3)**2*(h*n0(3)**2 + integral*(body%gamma/body%alpha))
         else if (without(element) == map%o3) then
             factor = -a(1)*a(2)/body%gamma
             turn(map%o1) = factor*map%m2
@@ -240,7 +239,7 @@ contains
         else
             known%action = -a(1)*a(3)*(map%parity*(n(2) - n0(2))/body%beta + h*n0(1)*n0(3))
         end if
-        known%norm = 0.0_wp
+        known%m_dm = 0.0_wp
         known%has_u = map%closer
         known%c = form(n0, n0)
         if (map%closer) known%u = form(over*n0, n0) - map%decay**2*lost

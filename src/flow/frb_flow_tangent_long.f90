@@ -135,7 +135,7 @@ contains
         end do
         it%triples = n
         do n = 0, most_halvings - 1
-            if (it%pmax*span <= middle_limit) exit      ! nu <= pmax
+            if (it%pmax*span <= middle_limit) exit      ! nu, if it is needed, <= pmax
             span = 0.25_wp*span
         end do
         it%squares = n
