@@ -122,27 +122,30 @@ contains
     end subroutine check_composition_in_lanes
 
     !> Lanes against one body at a time, for steps of all lengths: from the first terms of the series to many
-    !> doublings.
+    !> doublings; whole blocks and parts of them, of one and of several lengths, in turn.
     subroutine check_lengths_in_lanes(t)
         type(tally), intent(inout) :: t
-        integer, parameter :: n = 32, lengths = 120
+        integer, parameter :: numbers(4) = [32, 9, 31, 45], lengths = 120
         type(stream) :: random
         type(rigid_body) :: body
-        real(wp) :: h, moments(3), m0(3, n), m(3, n), q(4, n), phi(6, 6, n), m1(3), q1(4), phi1(6, 6)
-        real(wp) :: worst(4)
-        integer :: i, k
+        real(wp) :: h, moments(3), m1(3), q1(4), phi1(6, 6), worst(4)
+        real(wp), dimension(3, maxval(numbers)) :: m0, m
+        real(wp) :: q(4, maxval(numbers)), phi(6, 6, maxval(numbers))
+        integer :: i, k, n
 
         worst = 0.0_wp
         do k = 1, lengths
             moments = random%triangle()
             body = rigid_body(cshift(moments, mod(k, 3)))
-            h = minval(moments)*10.0_wp**(-3 + 4.0_wp*k/lengths)
+            h = minval(moments)*10.0_wp**(-3 + 4.0_wp*mod(37*k, lengths)/lengths)
+            n = numbers(1 + mod(k, size(numbers)))
             do i = 1, n
                 m(:, i) = random%direction()
+                if (mod(k, 3) == 0) m(:, i) = random%log_uniform(-2.0_wp, 0.0_wp)*m(:, i)
                 q(:, i) = no_turn
             end do
             m0 = m
-            call flow_tangent(body, h, m, q, phi)
+            call flow_tangent(body, h, m(:, :n), q(:, :n), phi(:, :, :n))
             do i = 1, n
                 m1 = m0(:, i)
                 q1 = no_turn

@@ -5,7 +5,8 @@ module frb_flow_tangent_many
     use frb_flow_limits, only: plain_largest
     use frb_flow_tangent_body, only: tangent_body
     use frb_flow_tangent_far, only: step_far
-    use frb_flow_tangent_lanes, only: lanes, kinds, far, lane_body, lane_orbits, load_lanes, keep_lanes
+    use frb_flow_tangent_lanes, only: lanes, kinds, far, lane_body, lane_orbits, reach_of_series, &
+        load_lanes, keep_lanes
     use frb_flow_tangent_near, only: step_near
     use frb_inertia, only: body_core
     use frb_kinds, only: wp
@@ -85,6 +86,7 @@ contains
             of%first = body%a(3)*t
             of%last = of%rate
         end if
+        of%most = reach_of_series(of)
     end function body_of_lanes
 
     !> Advances a group of bodies. Of a block that needs steps of several kinds, those of the kind that most
@@ -193,8 +195,8 @@ contains
         type(lane_orbits), intent(in) :: orbits
         real(wp), intent(inout) :: m(3, lanes), q(4, lanes), transition(36, lanes)
 
-        call clear(transition)
         if (kind == far) then
+            call clear(transition)
             call step_far(of, orbits, m, q, transition)
         else
             call step_near(kind, of, orbits, m, q, transition)
