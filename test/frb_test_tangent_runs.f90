@@ -28,7 +28,7 @@ contains
     subroutine test_tangent_runs(t)
         type(tally), intent(inout) :: t
 
-        call t%open_suite('tangent-runs', 28)
+        call t%open_suite('tangent-runs', 30)
         call check_composition(t)
         call check_composition_in_lanes(t, '0.01', 0.01_wp, 1.0e-14_wp)
         call check_composition_in_lanes(t, '0.1', 0.1_wp, 5.0e-14_wp)
@@ -128,12 +128,14 @@ contains
         integer, parameter :: numbers(4) = [32, 9, 31, 45], lengths = 120
         type(stream) :: random
         type(rigid_body) :: body
-        real(wp) :: h, moments(3), m1(3), q1(4), phi1(6, 6), worst(4)
+        real(wp) :: h, moments(3), m1(3), q1(4), phi1(6, 6), worst(5)
         real(wp), dimension(3, maxval(numbers)) :: m0, m
         real(wp) :: q(4, maxval(numbers)), phi(6, 6, maxval(numbers))
         integer :: i, k, n
+        logical :: zeros
 
         worst = 0.0_wp
+        zeros = .true.
         do k = 1, lengths
             moments = random%triangle()
             body = rigid_body(cshift(moments, mod(k, 3)))
@@ -141,24 +143,29 @@ contains
             n = numbers(1 + mod(k, size(numbers)))
             do i = 1, n
                 m(:, i) = random%direction()
-                if (mod(k, 3) == 0) m(:, i) = random%log_uniform(-2.0_wp, 0.0_wp)*m(:, i)
+                if (mod(k, 5) == 0) m(:, i) = random%log_uniform(-2.0_wp, 0.0_wp)*m(:, i)
                 q(:, i) = no_turn
             end do
             m0 = m
+            phi = -1.0_wp
             call flow_tangent(body, h, m(:, :n), q(:, :n), phi(:, :, :n))
+            zeros = zeros .and. all(abs(phi(1:3, 4:6, :n)) <= 0.0_wp)
             do i = 1, n
                 m1 = m0(:, i)
                 q1 = no_turn
                 call flow_tangent(body, h, m1, q1, phi1)
                 worst = worst_of(worst, [norm2(m(:, i) - m1), norm2(q(:, i) - q1), &
                                          norm2(phi(1:3, 1:3, i) - phi1(1:3, 1:3))/norm2(phi1(1:3, 1:3)), &
-                                         norm2(phi(4:6, 1:3, i) - phi1(4:6, 1:3))/norm2(phi1(4:6, 1:3))])
+                                         norm2(phi(4:6, 1:3, i) - phi1(4:6, 1:3))/norm2(phi1(4:6, 1:3)), &
+                                         norm2(phi(4:6, 4:6, i) - phi1(4:6, 4:6))])
             end do
         end do
+        call t%ok('momentum-in-lanes-does-not-depend-on-the-attitude', zeros)
         call t%at_most('momentum-in-lanes-is-that-of-one-body', worst(1), lane_bar)
         call t%at_most('attitude-in-lanes-is-that-of-one-body', worst(2), lane_bar)
         call t%at_most('J-in-lanes-is-that-of-one-body', worst(3), lane_bar)
         call t%at_most('W-in-lanes-is-that-of-one-body', worst(4), lane_bar)
+        call t%at_most('E-in-lanes-is-that-of-one-body', worst(5), lane_bar)
     end subroutine check_lengths_in_lanes
 
     !> Bodies whose steps differ in length, some of them refused, against one body at a time.

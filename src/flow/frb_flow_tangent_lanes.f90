@@ -15,7 +15,7 @@ module frb_flow_tangent_lanes
     private
 
     public :: lanes, of_m, of_q, of_phi, kinds, tiny, short, middle, far
-    public :: lane_body, lane_orbits, reach_of_series, load_lanes, keep_lanes
+    public :: lane_body, lane_orbits, reach_of_kinds, load_lanes, keep_lanes
 
     integer, parameter :: lanes = 32    !! bodies in a block
     !> From one component of m, of q, of transition in the first lane of a block to that in the last.
@@ -34,7 +34,7 @@ module frb_flow_tangent_lanes
         real(wp) :: first, last     !! a1 t, a3 t
         real(wp) :: rate            !! the larger of them
         real(wp) :: rho(14)         !! polynomial_of_rho
-        real(wp) :: most(0:middle)  !! reach_of_series
+        real(wp) :: most(0:far)     !! reach_of_kinds
     end type lane_body
 
     !> The orbits of a block.
@@ -129,7 +129,7 @@ contains
         least = (body%rate*body%rate)*transfer(lowest, least)
         largest = (body%rate*body%rate)*transfer(highest, largest)
         many = 0
-        do l = tiny, middle
+        do l = tiny, far
             if (least > body%most(l - 1) .and. largest <= body%most(l)) then
                 many(l) = lanes
                 it%kind = real(l, wp)
@@ -144,7 +144,8 @@ contains
         type(lane_body), intent(in) :: body
         type(lane_orbits), intent(inout) :: it
         integer, intent(out) :: many(kinds)
-        real(wp) :: square, kind        !! of the largest half angle
+        real(wp) :: square              !! that of the largest half angle
+        real(wp) :: kind
         integer(int64) :: to_tiny, to_short, to_middle, to_far      !! lanes up to each kind
         integer :: l
 
@@ -169,23 +170,24 @@ contains
         many = int([to_tiny, to_short - to_tiny, to_middle - to_short, to_far - to_middle])
     end subroutine find_kinds
 
-    !> Largest squares of a half angle of the kinds of steps that the series reach; the first number is 0. By
-    !> |m| alone, as p and r are at most |m|^2 times the larger of bg and ab: so bodies with momenta of one
-    !> size are of one kind, and their blocks need only one.
-    pure function reach_of_series(body) result(most)
+    !> Largest squares of a half angle of each kind of steps; the first number is 0. By |m| alone, as p and r
+    !> are at most |m|^2 times the larger of bg and ab: so bodies with momenta of one size are of one kind, and
+    !> their blocks need only one. Some far steps are beyond: their p and r are smaller than that.
+    pure function reach_of_kinds(body) result(most)
         type(lane_body), intent(in) :: body
-        real(wp) :: most(0:middle)
-        real(wp), parameter :: of_triple(tiny:middle) = [tiny_size, short_limit, middle_limit]
+        real(wp) :: most(0:far)
+        real(wp), parameter :: of_triple(tiny:far) = [tiny_size, short_limit, middle_limit, &
+                                                      0.999_wp*period_limit]
         real(wp) :: k, square
         integer :: l
 
         k = max(body%a*body%b, body%b*body%g)
         square = body%rate*body%rate
-        most = [0.0_wp, tiny_size/angle_as_size, small_turn_limit, middle_turn_limit]
-        do l = tiny, middle
+        most = [0.0_wp, tiny_size/angle_as_size, small_turn_limit, middle_turn_limit, sin_cos_limit**2]
+        do l = tiny, far
             if (most(l)*k > of_triple(l)*square) most(l) = of_triple(l)*square/k
         end do
-    end function reach_of_series
+    end function reach_of_kinds
 
     !> The lanes of other kinds stand still, their momenta become 0.
     pure subroutine keep_lanes(kind, it)

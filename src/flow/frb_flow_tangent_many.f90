@@ -5,7 +5,7 @@ module frb_flow_tangent_many
     use frb_flow_limits, only: plain_largest
     use frb_flow_tangent_body, only: tangent_body
     use frb_flow_tangent_far, only: step_far
-    use frb_flow_tangent_lanes, only: lanes, kinds, far, lane_body, lane_orbits, reach_of_series, &
+    use frb_flow_tangent_lanes, only: lanes, kinds, far, lane_body, lane_orbits, reach_of_kinds, &
         load_lanes, keep_lanes
     use frb_flow_tangent_near, only: step_near
     use frb_inertia, only: body_core
@@ -86,7 +86,7 @@ contains
             of%first = body%a(3)*t
             of%last = of%rate
         end if
-        of%most = reach_of_series(of)
+        of%most = reach_of_kinds(of)
     end function body_of_lanes
 
     !> Advances a group of bodies. Of a block that needs steps of several kinds, those of the kind that most

@@ -196,8 +196,8 @@ contains
         end do
     end subroutine find_momenta
 
-    !> The norms of the turns (1, Y), less 1, inverse: by series where they are shorter than a root and a
-    !> division.
+    !> The inverse norms of the turns (1, Y), less 1. Where a series is enough, it takes less time than a root
+    !> and a division.
     pure subroutine find_norms(kind, it)
         integer, intent(in) :: kind
         type(series_lanes), intent(inout) :: it
