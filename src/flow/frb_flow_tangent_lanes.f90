@@ -171,8 +171,8 @@ contains
     end subroutine find_kinds
 
     !> Largest squares of a half angle of each kind of steps; the first number is 0. By |m| alone, as p and r
-    !> are at most |m|^2 times the larger of bg and ab: so bodies with momenta of one size are of one kind, and
-    !> their blocks need only one. Some far steps are beyond: their p and r are smaller than that.
+    !> are at most |m|^2 times the larger of bg and ab: so bodies with momenta of one size are of one kind,
+    !> and their blocks need only one. Some far steps are beyond: their p and r are smaller than that.
     pure function reach_of_kinds(body) result(most)
         type(lane_body), intent(in) :: body
         real(wp) :: most(0:far)
