@@ -101,8 +101,9 @@ contains
         real(wp), intent(in), dimension(lanes) :: x1, x2, x3
         type(lane_orbits), intent(inout) :: it
         integer, intent(out) :: many(kinds)
-        real(wp) :: n1, n2, n3, ab, ag, bg, k, gg, least, largest
-        integer(int64) :: bits, lowest, highest         !! those of |m|^2 >= 0 ascend with it
+        real(wp) :: n1, n2, n3, ab, ag, bg, k, gg
+        real(wp) :: least, largest                      !! squares of a body's largest half angle
+        integer(int64) :: bits, lowest, highest         !! bit patterns of |m|^2: they ascend with it
         integer :: l
 
         ab = body%a*body%b
@@ -139,7 +140,7 @@ contains
         call find_kinds(body, it, many)
     end subroutine find_reach
 
-    !> The kinds of the steps of a block that may need several.
+    !> The kinds of the steps of a block that may need several, lane by lane.
     pure subroutine find_kinds(body, it, many)
         type(lane_body), intent(in) :: body
         type(lane_orbits), intent(inout) :: it
@@ -170,9 +171,10 @@ contains
         many = int([to_tiny, to_short - to_tiny, to_middle - to_short, to_far - to_middle])
     end subroutine find_kinds
 
-    !> Largest squares of a half angle of each kind of steps; the first number is 0. By |m| alone, as p and r
-    !> are at most |m|^2 times the larger of bg and ab: so bodies with momenta of one size are of one kind,
-    !> and their blocks need only one. Some far steps are beyond: their p and r are smaller than that.
+    !> The largest square of a half angle, to which each kind of steps reaches; the first number is 0. By |m|
+    !> alone, as p and r are at most |m|^2 times the larger of bg and ab: so bodies with momenta of one size
+    !> are of one kind, and their blocks need only one. The far kind reaches beyond its number where p and r
+    !> are smaller than that: find_kinds decides. The factor 0.999 is for rounding.
     pure function reach_of_kinds(body) result(most)
         type(lane_body), intent(in) :: body
         real(wp) :: most(0:far)
